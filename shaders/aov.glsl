@@ -18,11 +18,12 @@ void closest(uint index, Hit hit) {
         aov.v[at + 1u] = aov.v[at + 2u] = aov.v[at + 3u] = uvec4(0u);
         return;
     }
-    Surface s = surface_at(centre_ray(p, index), hit);
+    Ray r = centre_ray(p, index);
+    Surface s = surface_at(r, hit);
     SceneRoot root = SceneRoot(push.scene);
     SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[s.submesh];
     vec4 color = base_color(submesh, MaterialRecords(root.materials).v[submesh.material], s.primitive, s.uv);
-    aov.v[at] = uvec4(floatBitsToUint(hit.t), hit.instance, hit.primitive, submesh.material);
+    aov.v[at] = uvec4(floatBitsToUint(hit.t + clipped_length(p, r.direction)), hit.instance, hit.primitive, submesh.material);
     aov.v[at + 1u] = uvec4(floatBitsToUint(s.position), floatBitsToUint(color.r));
     aov.v[at + 2u] = uvec4(floatBitsToUint(s.ng), floatBitsToUint(color.g));
     aov.v[at + 3u] = uvec4(floatBitsToUint(s.ns), floatBitsToUint(color.b));

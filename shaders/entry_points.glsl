@@ -49,6 +49,8 @@ void main() {
     vec3 middle = normalize(d0 + d1 + d2 + d3);
     // what a unit of t is at least, in units of length
     float unit = min(min(dot(d0, middle), dot(d1, middle)), min(dot(d2, middle), dot(d3, middle))) * (1.0 - 1e-5);
+    // rays start at the near clipping plane, at most so far from the eye
+    float skipped = p.clip_near * max(max(length(d0), length(d1)), max(length(d2), length(d3))) * (1.0 + 1e-5);
     // a ray's direction rounds by a tenth of this
     float slack = 4e-6 * max(max(length(d0), length(d1)), max(length(d2), length(d3)));
     vec3 least = min(min(d0, d1), min(d2, d3)) - slack, most = max(max(d0, d1), max(d2, d3)) + slack;
@@ -102,7 +104,7 @@ void main() {
                     float far = min(min(f.x, f.y), f.z);
                     bool hit = near <= far * (1.0 + 1e-5) && near < INFINITY;
                     hits |= hit ? 1u << c : 0u;
-                    near_of[c] = floatBitsToUint(near * unit) & ~1u;
+                    near_of[c] = floatBitsToUint(max(near * unit - skipped, 0.0)) & ~1u;
                 }
                 hits &= WIDE_NODE_UPPER_Y.y >> 24;
             }

@@ -23,10 +23,10 @@ Ray camera_sample(BlockParams p, uint index) {
     vec2 u = sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_FILM);
     // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest, where a frame has several, each has a place of its own, as in a still.
     vec2 offset = WITH_SIGNAL && p.pixel_filter == FILTER_CENTRE ? p.centre_offset : !WITH_SIGNAL && WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
-    Ray r = camera_ray(p, vec2(pixel) + 0.5 + offset);
+    Ray r = unclipped_camera_ray(p, vec2(pixel) + 0.5 + offset);
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(p, index), 0u));
-    if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_LENS));
-    return r;
+    if (WITH_LENS) r = lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_LENS));
+    return clip_ray(p, r);
 }
 
 // Where it has been traced for the G-buffer.

@@ -18,7 +18,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::raster::{DrawStats, Primary, Raster, View};
 use skylit::scene::builtin::shapes;
-use skylit::scene::{Camera, Geometry, Instance, Mesh, Motion, Projection, Scene};
+use skylit::scene::{Camera, ClipPlanes, Geometry, Instance, Mesh, Motion, Projection, Scene};
 use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
 
 use common::{ALL, assert_validation_clean, scene, tracer, tracers};
@@ -226,6 +226,44 @@ fn gpu_orthographic_views() {
     let (lo, hi) = scene.bounds().unwrap();
     let camera = Camera::look_at(0.5 * (lo + hi), hi, DVec3::Y, 1.0);
     check(&device, "grid:4, orthographic from its middle", &scene, &orthographic(&camera, 2.0), SIZE, BOUNDS);
+    assert_validation_clean(&device);
+}
+
+/// The camera with clipping planes that cut what it sees: at these shares of the depth of the scene's bounds.
+fn clipped(scene: &Scene, camera: &Camera, [near, far]: [f64; 2]) -> Camera {
+    let (lo, hi) = scene.bounds().unwrap();
+    let corner = |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    let depths: Vec<f64> = (0..8).map(|k| -camera.camera_to_world.inverse().transform_point3(corner(k)).z).collect();
+    let (least, most) = depths.iter().fold((f64::INFINITY, 0.0f64), |(l, m), &d| (l.min(d.max(0.0)), m.max(d)));
+    let at = |share: f64| if share.is_finite() { least + share * (most - least) } else { share };
+    Camera { clip: ClipPlanes { near: at(near), far: at(far) }, ..camera.clone() }
+}
+
+#[test]
+fn gpu_clipping_planes() {
+    let Some(device) = device() else { return };
+    for (name, half) in [("stairs", 2.0), ("leaf-cards", 2.0), ("cornell-spheres", 3.0), ("mirrored", 1.5)] {
+        let scene = if name == "mirrored" { mirrored() } else { scene(name) };
+        let tracer = tracer(&device, TracerKind::Compute, &scene);
+        for planes in [[0.4, f64::INFINITY], [0.0, 0.6], [0.35, 0.7]] {
+            for camera in [scene.cameras[0].clone(), orthographic(&scene.cameras[0], half)] {
+                let camera = clipped(&scene, &camera, planes);
+                let shot = Shot { scene: &scene, camera: &camera, size: SIZE };
+                // a plane cuts a surface between pixels, as an edge does
+                let bounds = Bounds { ids: 0.01, ..BOUNDS };
+                let d = shot.check(&format!("{name}, {planes:?}, {:?}", camera.projection), &tracer, bounds);
+                assert!(d.hits > 1000, "{name}: hardly anything is seen");
+                let drawn = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap();
+                let to_camera = camera.camera_to_world.inverse();
+                for pixel in drawn.iter().filter(|p| p.instance != NONE) {
+                    let p = Vec3::from_array(pixel.position).as_dvec3() + scene.origin();
+                    let depth = -to_camera.transform_point3(p).z;
+                    let ClipPlanes { near, far } = camera.clip;
+                    assert!(depth >= near - 1e-2 && depth <= far + 1e-2, "{name}, {planes:?}: {depth} of {near} to {far}");
+                }
+            }
+        }
+    }
     assert_validation_clean(&device);
 }
 

@@ -28,8 +28,24 @@ bool in_block(BlockParams p, uvec2 pixel) {
     return all(lessThan(pixel, p.block_size));
 }
 
-// Ray through a point of the image, in pixels from the upper left corner.
-Ray camera_ray(BlockParams p, vec2 at) {
+// Length along a direction from the camera of what lies before the near clipping plane.
+float clipped_length(BlockParams p, vec3 direction) {
+    vec4 rows[3] = p.camera_to_world;
+    return p.clip_near > 0.0 ? p.clip_near / -dot(direction, vec3(rows[0].z, rows[1].z, rows[2].z)) : 0.0;
+}
+
+// The part of a ray from the camera between the clipping planes. It starts at the near one: tmin may hold the ray's seed.
+Ray clip_ray(BlockParams p, Ray r) {
+    if (p.clip_near == 0.0 && p.clip_far == 0.0) return r;
+    vec4 rows[3] = p.camera_to_world;
+    float length_ = 1.0 / -dot(r.direction, vec3(rows[0].z, rows[1].z, rows[2].z));
+    r.origin += r.direction * (p.clip_near * length_);
+    if (p.clip_far > 0.0) r.tmax = (p.clip_far - p.clip_near) * length_;
+    return r;
+}
+
+// Ray from the camera through a point of the image, in pixels from the upper left corner, whatever is clipped.
+Ray unclipped_camera_ray(BlockParams p, vec2 at) {
     vec2 ndc = 2.0 * at / vec2(p.image_size) - 1.0;
     vec2 plane = vec2(ndc.x, -ndc.y) * p.view;
     vec4 rows[3] = p.camera_to_world;
@@ -40,6 +56,11 @@ Ray camera_ray(BlockParams p, vec2 at) {
     }
     vec3 d = vec3(plane, -1.0);
     return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
+}
+
+// Ray through a point of the image, in pixels from the upper left corner.
+Ray camera_ray(BlockParams p, vec2 at) {
+    return clip_ray(p, unclipped_camera_ray(p, at));
 }
 
 // The ray of an index, through the centre of its pixel or at an offset from it that all pixels share; an invalid ray for padding.

@@ -31,7 +31,8 @@ Cone camera_cone(BlockParams p, vec3 direction) {
     if (p.orthographic != 0u) return Cone(side, 0.0);
     vec4 rows[3] = p.camera_to_world;
     // a pixel off the middle is farther away
-    return Cone(0.0, side * abs(dot(vec3(rows[0].z, rows[1].z, rows[2].z), direction)));
+    float spread = side * abs(dot(vec3(rows[0].z, rows[1].z, rows[2].z), direction));
+    return Cone(spread * clipped_length(p, direction), spread);
 }
 
 // The cone after a distance.

@@ -228,7 +228,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     Shading m;
     if (WITH_CONSTANT_ALBEDO) m = grey_shading(s, towards_viewer, p.albedo);
     else m = shade(s, towards_viewer, log_side);
-    if (WITH_VIEW) return view_value(p.view, s, m, hit.t, log_side);
+    if (WITH_VIEW) return view_value(p.view, s, m, hit.t + clipped_length(block, ray.direction), log_side);
     vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {
         float light = 0.0;

@@ -29,4 +29,6 @@ void main() {
     }
     vec4 sphere = uintBitsToFloat(Quads(push.rays).v[primitive]);
     gl_Position = to_clip(seen_from_eye(sphere.xyz + (turned * MARGIN * sphere.w) * p));
+    // clipping planes cut the sphere, in the fragment shader, and not its box
+    gl_Position.z = RasterParams(push.pass).box_depth;
 }

@@ -17,6 +17,8 @@ impl BlockParams {
             camera_to_world: camera.camera_to_world,
             view: camera.view,
             orthographic: camera.orthographic as u32,
+            clip_near: camera.clip[0],
+            clip_far: if camera.clip[1].is_finite() { camera.clip[1] } else { 0.0 },
             seed,
             image_size,
             block_origin: block.origin,

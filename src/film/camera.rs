@@ -26,22 +26,25 @@ pub enum Choice {
     },
 }
 
+/// The scene's camera with this index or name.
+pub fn named<'s>(scene: &'s Scene, wanted: &str) -> Option<&'s Camera> {
+    let by_index = wanted.parse::<usize>().ok().and_then(|k| scene.cameras.get(k));
+    by_index.or_else(|| scene.cameras.iter().find(|c| c.name == wanted))
+}
+
 /// Finds the camera for an image of `aspect` = width / height.
 pub fn choose(scene: &Scene, choice: &Choice, aspect: f64) -> Result<Camera> {
     match choice {
         Choice::LookAt { eye, target, up, fov_y } => Ok(Camera::look_at(*eye, *target, *up, *fov_y)),
-        Choice::Named(wanted) => {
-            let by_index = wanted.parse::<usize>().ok().and_then(|k| scene.cameras.get(k));
-            by_index.or_else(|| scene.cameras.iter().find(|c| &c.name == wanted)).cloned().ok_or_else(|| {
-                let names: Vec<_> = scene.cameras.iter().enumerate().map(|(k, c)| format!("{k} '{}'", c.name)).collect();
-                let available = if names.is_empty() {
-                    "the scene has no cameras; use --eye and --target".to_owned()
-                } else {
-                    format!("available: {}", names.join(", "))
-                };
-                Error::Usage(format!("--camera {wanted}: no such camera; {available}"))
-            })
-        }
+        Choice::Named(wanted) => named(scene, wanted).cloned().ok_or_else(|| {
+            let names: Vec<_> = scene.cameras.iter().enumerate().map(|(k, c)| format!("{k} '{}'", c.name)).collect();
+            let available = if names.is_empty() {
+                "the scene has no cameras; use --eye and --target".to_owned()
+            } else {
+                format!("available: {}", names.join(", "))
+            };
+            Error::Usage(format!("--camera {wanted}: no such camera; {available}"))
+        }),
         Choice::Auto => match (scene.cameras.first(), scene.bounds()) {
             (Some(camera), _) => Ok(camera.clone()),
             (None, Some((lo, hi))) => Ok(Camera::framing(lo, hi, aspect)),
@@ -59,6 +62,8 @@ pub struct CameraRecord {
     pub view: [f32; 2],
     /// Orthographic projection.
     pub orthographic: bool,
+    /// Distances of the near and the far clipping plane along the view direction, scene units; 0 and infinity: none.
+    pub clip: [f32; 2],
 }
 
 impl CameraRecord {
@@ -74,6 +79,7 @@ impl CameraRecord {
             camera_to_world: crate::tracer::gpu_scene::rows(&relative),
             view: [(half * aspect) as f32, half as f32],
             orthographic,
+            clip: [camera.clip.near as f32, camera.clip.far as f32],
         }
     }
 }

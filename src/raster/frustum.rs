@@ -56,6 +56,8 @@ pub(super) struct Frustum {
     /// The camera's transform flips the winding order.
     pub turned: bool,
     orthographic: bool,
+    /// Distances of the near and far clipping planes.
+    clip_planes: [f64; 2],
     // clip coordinates x, y, w
     x: Plane,
     y: Plane,
@@ -124,6 +126,7 @@ impl Frustum {
             eye: column(3).as_vec3(),
             turned: determinant < 0.0,
             orthographic,
+            clip_planes: view.camera.clip.map(f64::from),
             x,
             y,
             w,
@@ -156,13 +159,31 @@ impl Frustum {
     /// Rows of the matrix from positions relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
     /// is seen; clip space is `wide` times as large as the image.
     pub fn clip(&self, depth: [f64; 2], wide: f64) -> [[f32; 4]; 4] {
+        let [clip_near, clip_far] = self.clip_planes;
         let z = if self.orthographic {
-            let (near, far) = (depth[0].max(0.0), depth[1].max(0.0));
+            let (near, far) = (depth[0].max(clip_near), depth[1].max(clip_near).min(clip_far));
             let length = (far - near).max(1e-30);
             Plane { normal: -self.depth.normal / length, offset: far / length }
         } else {
-            Plane { normal: DVec3::ZERO, offset: (NEAR * depth[1]).max(1e-30) }
+            let near = self.nearest(depth).max(clip_near);
+            if clip_far.is_finite() {
+                // 1 at the near plane and 0 at the far one, after division by the depth
+                let scale = near / (clip_far - near).max(1e-30);
+                Plane { normal: -self.depth.normal * scale, offset: clip_far * scale }
+            } else {
+                Plane { normal: DVec3::ZERO, offset: near }
+            }
         };
         [self.x.row(1.0 / wide), self.y.row(1.0 / wide), z.row(1.0), self.w.row(1.0)]
+    }
+
+    /// Distance of what single precision does not tell from the eye.
+    fn nearest(&self, depth: [f64; 2]) -> f64 {
+        (NEAR * depth[1]).max(1e-30)
+    }
+
+    /// Depth in clip space of what is not clipped by depth, unless it is behind the camera; `depth` as for [`Frustum::clip`].
+    pub fn box_depth(&self, depth: [f64; 2]) -> f32 {
+        if self.orthographic { 0.5 } else { self.nearest(depth) as f32 }
     }
 }

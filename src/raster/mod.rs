@@ -153,6 +153,8 @@ impl Raster {
                 turned: if frustum.turned { -1.0 } else { 1.0 },
                 at: view.at,
                 block: self.params.address() + std::mem::offset_of!(RasterMemory, block) as u64,
+                box_depth: frustum.box_depth(depth),
+                reserved: [0; 3],
             },
             block: view.block.params(view.image_size, &view.camera, 0),
         };

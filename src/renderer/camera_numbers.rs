@@ -5,13 +5,13 @@ use serde_json::{Value, json};
 
 use super::settings::CameraSettings;
 use crate::output::exr::{WORLD_TO_CAMERA, WORLD_TO_NDC, matrix_text};
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, ClipPlanes, Projection};
 
 /// Metadata key of [`pose`].
 pub const POSE: &str = "camera_pose";
 
 /// Position (`eye`), a point in the middle of the image (`target`), up vector (`up`), scene units; and vertical field of view in degrees (`fov_y`), or half of the height of the image in
-/// scene units (`half_height`) if the camera is orthographic. As `--eye`, `--target`, `--up` and `--fov-y` they give the same camera.
+/// scene units (`half_height`) if the camera is orthographic; its clipping planes (`clip`), if it has some. As `--eye`, `--target`, `--up`, `--fov-y` and `--clip` they give the same camera.
 pub fn pose(camera: &Camera) -> Value {
     let m = &camera.camera_to_world;
     // far enough for the direction to survive the sum
@@ -24,6 +24,9 @@ pub fn pose(camera: &Camera) -> Value {
     match camera.projection {
         Projection::Perspective { fov_y } => pose["fov_y"] = json!(fov_y.to_degrees()),
         Projection::Orthographic { half_height } => pose["half_height"] = json!(half_height),
+    }
+    if camera.clip != ClipPlanes::NONE {
+        pose["clip"] = json!(camera.clip);
     }
     pose
 }

@@ -2,13 +2,15 @@
 //!
 //! This is the one rule for all commands. What is chosen is also known as options ([`Completed::chosen`]): with them the same image is made, whatever becomes of the scene.
 
-use super::settings::options_text;
+use glam::DVec3;
+
+use super::settings::{DEFAULT_SIZE, options_text, size_of_aspect};
 use super::survey::radius::{CLOSED, TARGET};
 use super::survey::{Survey, framing, light, radius, significant};
 use super::{RenderSettings, Renderer};
 use crate::error::Result;
 use crate::integrators::lighting::LightingSettings;
-use crate::scene::Camera;
+use crate::scene::{Camera, ClipPlanes, Scene};
 use crate::settings::{Capability, Length};
 
 /// Metadata key of the options that were chosen ([`Completed::chosen`]).
@@ -58,6 +60,12 @@ impl Renderer {
         if !stays {
             self.light(&settings.lighting)?;
         }
+        let mut choices = Vec::new();
+        let mut settings = settings.clone();
+        if let Some((size, sentence)) = size_of_camera(&settings, &self.scene).filter(|_| camera.is_none()) {
+            settings.image.size = Some(size);
+            choices.push(sentence);
+        }
         let size = settings.size(&self.scene);
         crate::output::check_size(size[0], size[1])?;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
@@ -79,6 +87,7 @@ impl Renderer {
             Some(camera) => camera,
             None => settings.camera.choose(&survey, aspect)?,
         };
+        choices.extend(clipped(&camera, &survey));
 
         // the AO radius
         if capabilities.contains(&Capability::AmbientOcclusion) {
@@ -126,6 +135,28 @@ impl Renderer {
         }
         Ok(())
     }
+}
+
+/// The image size that follows from the scene's camera, and what there is to say about it; `None` where settings or scene give one, or it is that of all others.
+fn size_of_camera(settings: &RenderSettings, scene: &Scene) -> Option<([u32; 2], String)> {
+    if settings.image.size.or(scene.hints.size).is_some() {
+        return None;
+    }
+    let aspect = settings.camera.scene_camera(scene)?.aspect?;
+    let size = size_of_aspect(aspect).filter(|size| *size != DEFAULT_SIZE)?;
+    let [width, height] = size;
+    Some((size, format!("image size: {width}x{height}, of the aspect ratio of the scene's camera, {:.4} (--size)", aspect)))
+}
+
+/// What there is to say about clipping planes that hide something, as far as the scene's bounds tell.
+fn clipped(camera: &Camera, survey: &Survey) -> Option<String> {
+    let (lo, hi) = survey.bounds().ok().filter(|_| camera.clip != ClipPlanes::NONE)?;
+    let to_camera = camera.camera_to_world.inverse();
+    let corner = |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    let farthest = (0..8).map(|k| -to_camera.transform_point3(corner(k)).z).fold(0.0, f64::max);
+    // a near plane is usually there for rasterizers
+    let hides = camera.clip.far < farthest || camera.clip.near > 1e-2 * survey.diagonal();
+    hides.then(|| format!("clipping: the camera sees from {} to {} scene units (--clip)", camera.clip.near, camera.clip.far))
 }
 
 /// An AO radius, and what there is to say about it.

@@ -21,7 +21,7 @@ use crate::output::tone_map::ToneMap;
 #[cfg(feature = "cli")]
 use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
-use crate::scene::{Camera, Projection, Scene, SceneSettings};
+use crate::scene::{Camera, ClipPlanes, Projection, Scene, SceneSettings};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
 use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
@@ -44,7 +44,7 @@ settings! {
     pub struct ImageSettings {
         /// Samples per pixel [default: the scene's, or 16]
         spp: Option<u32>, option(value_parser = clap::value_parser!(u32).range(1..=1 << 24)), applies(AppliesTo::STILLS), basic;
-        /// Image size in pixels [default: the scene's, or 1280x720]
+        /// Image size in pixels [default: the scene's, or 1280x720, or as many pixels in the aspect ratio of the scene's camera]
         size: Option<[u32; 2]>, option(value_name = "WxH", value_parser = parse_size), applies(AppliesTo::ALL), basic;
         /// Seed of the sampler [default: 0]
         seed: Option<u32>, option(value_name = "N"), applies(AppliesTo::ALL);
@@ -82,6 +82,15 @@ settings! {
             option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL);
         /// Vertical field of view in degrees [default: the camera's, or 45]
         fov_y: Option<f64>, option(value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
+        /// Clipping planes: what the camera sees lies between these distances along the view direction, in scene units; FAR may be `inf`, and `none` clips nothing
+        /// [default: those of the scene's camera, or none]
+        clip: Option<ClipPlanes>, option(value_name = "NEAR,FAR"), applies(AppliesTo::ALL);
+    }
+}
+
+impl crate::settings::Editable for Option<ClipPlanes> {
+    fn value(&mut self) -> crate::settings::Value<'_> {
+        crate::settings::Value::Other
     }
 }
 
@@ -129,11 +138,26 @@ impl CameraSettings {
         }
     }
 
+    /// The scene's camera that they choose, if it is one.
+    pub fn scene_camera<'s>(&self, scene: &'s Scene) -> Option<&'s Camera> {
+        match &self.camera {
+            _ if self.eye.is_some() || self.view.is_some() => None,
+            Some(name) => camera::named(scene, name),
+            None => scene.cameras.first(),
+        }
+    }
+
     /// Chooses the camera for images of `aspect` = width / height, by what it would see where the settings and the scene leave it open.
     ///
     /// # Errors
     /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] if the scene has neither a camera nor geometry.
     pub fn choose(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
+        let camera = self.choose_unclipped(survey, aspect)?;
+        Ok(Camera { clip: self.clip.unwrap_or(camera.clip), ..camera })
+    }
+
+    /// The camera with clipping planes of its own, if it is one of the scene's.
+    fn choose_unclipped(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
         let scene = survey.scene();
         let fov_y = self.fov_y.map(f64::to_radians);
         if let Some(chosen) = self.automatic(survey, aspect)? {
@@ -202,6 +226,28 @@ impl FilmSettings {
     pub fn keeps_state(&self) -> bool {
         self.resumable || self.intervals || self.resume.is_some()
     }
+}
+
+/// Aspect ratios from which image sizes follow: others are mistakes.
+const ASPECTS: std::ops::RangeInclusive<f64> = 1.0 / 64.0..=64.0;
+
+/// The image size of an aspect ratio (width over height) with about as many pixels as [`DEFAULT_SIZE`], within three per cent of a side as close to the ratio as whole numbers come;
+/// `None` for a ratio that no image has.
+pub fn size_of_aspect(aspect: f64) -> Option<[u32; 2]> {
+    let pixels = DEFAULT_SIZE.iter().map(|&n| f64::from(n)).product::<f64>();
+    let height = ASPECTS.contains(&aspect).then(|| (pixels / aspect).sqrt())?;
+    let size = |height: f64| [(height * aspect).round(), height];
+    let error = |[width, height]: [f64; 2]| (width / height / aspect - 1.0).abs();
+    // the nearest first, of equal ones
+    let mut best = size(height.round());
+    for step in 1..=(0.03 * height) as u32 {
+        for other in [height.round() + f64::from(step), height.round() - f64::from(step)].map(size) {
+            if error(other) < error(best) - 1e-6 {
+                best = other;
+            }
+        }
+    }
+    Some(best.map(|n| n.max(1.0) as u32))
 }
 
 /// Settings as options of `skylit render`, quoted as a shell needs them, with numbers as people write them: `2`, not `2.0`.
@@ -487,7 +533,7 @@ impl RenderSettings {
         flags
     }
 
-    /// Image size in pixels, of a scene.
+    /// Image size in pixels, of a scene; without one of its own, whatever its camera's aspect ratio ([`size_of_aspect`]).
     pub fn size(&self, scene: &Scene) -> [u32; 2] {
         self.image.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE)
     }
@@ -561,6 +607,20 @@ mod tests {
         ] {
             let error = RenderSettings::from_words(line).unwrap_err().to_string();
             assert!(error.contains(part) && !error.contains('\n'), "{line}: {error}");
+        }
+    }
+
+    #[test]
+    fn sizes_have_the_aspect_ratio_of_cameras() {
+        assert_eq!(size_of_aspect(16.0 / 9.0), Some(DEFAULT_SIZE));
+        assert_eq!([size_of_aspect(1.0), size_of_aspect(4.0)], [Some([960, 960]), Some([1920, 480])]);
+        for aspect in [0.1, 0.5625, 4.0 / 3.0, 1.618, 2.39, 21.0 / 9.0, 60.0] {
+            let [width, height] = size_of_aspect(aspect).unwrap().map(f64::from);
+            assert!((width / height / aspect - 1.0).abs() < 1e-3, "{aspect}: {width}x{height}");
+            assert!((width * height / 921_600.0 - 1.0).abs() < 0.07, "{aspect}: {width}x{height}");
+        }
+        for aspect in [0.0, -1.0, 1e-3, 1e9, f64::INFINITY, f64::NAN] {
+            assert_eq!(size_of_aspect(aspect), None);
         }
     }
 

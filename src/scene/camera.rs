@@ -1,6 +1,72 @@
 //! Cameras.
 
+use std::fmt;
+use std::str::FromStr;
+
 use glam::{DAffine3, DMat3, DVec3};
+
+/// Clipping planes: a camera sees what lies between them. Distances along the view direction, scene units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClipPlanes {
+    /// Distance of the near plane, at least 0.
+    pub near: f64,
+    /// Distance of the far plane, above that of the near one; may be infinite.
+    pub far: f64,
+}
+
+impl ClipPlanes {
+    /// A camera sees everything in front of it.
+    pub const NONE: Self = Self { near: 0.0, far: f64::INFINITY };
+
+    /// Where a ray from the camera passes the planes; `depth`: how much a unit of its length takes it along the view direction.
+    pub fn of_ray(self, depth: f64) -> [f64; 2] {
+        [self.near / depth, self.far / depth]
+    }
+}
+
+impl Default for ClipPlanes {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+/// `NEAR,FAR`, where FAR may be `inf`, or `none`.
+impl FromStr for ClipPlanes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.trim() == "none" {
+            return Ok(Self::NONE);
+        }
+        let numbers = text.split_once(',').and_then(|(near, far)| Some((near.trim().parse().ok()?, far.trim().parse().ok()?)));
+        let planes = numbers.map(|(near, far)| Self { near, far });
+        let holds = |p: &Self| p.near >= 0.0 && p.near.is_finite() && p.far > p.near;
+        planes.filter(holds).ok_or_else(|| {
+            "expected NEAR,FAR, two distances along the view direction in scene units of which the second is larger and may be `inf`, or `none`".to_owned()
+        })
+    }
+}
+
+impl fmt::Display for ClipPlanes {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match *self {
+            Self::NONE => f.write_str("none"),
+            Self { near, far } => write!(f, "{near},{far}"),
+        }
+    }
+}
+
+impl serde::Serialize for ClipPlanes {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for ClipPlanes {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
 
 /// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +94,8 @@ pub struct Camera {
     pub projection: Projection,
     /// Aspect ratio (width over height) in the file; the image size overrides it.
     pub aspect: Option<f64>,
+    /// Clipping planes.
+    pub clip: ClipPlanes,
 }
 
 impl Camera {
@@ -42,6 +110,7 @@ impl Camera {
             camera_to_world: DAffine3::from_mat3_translation(basis, eye),
             projection: Projection::Perspective { fov_y },
             aspect: None,
+            clip: ClipPlanes::NONE,
         }
     }
 
@@ -99,6 +168,7 @@ impl Camera {
             camera_to_world: DAffine3::from_mat3_translation(basis, eye),
             projection: Projection::Perspective { fov_y },
             aspect: None,
+            clip: ClipPlanes::NONE,
         })
     }
 }
@@ -113,6 +183,19 @@ pub(in crate::scene) fn rigid(to_world: &DAffine3) -> DAffine3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn clipping_planes_are_read_as_they_are_written() {
+        for (text, near, far) in [("0.1,100", 0.1, 100.0), ("0,inf", 0.0, f64::INFINITY), (" 2 , 3.5", 2.0, 3.5)] {
+            let planes: ClipPlanes = text.parse().unwrap();
+            assert_eq!((planes.near, planes.far), (near, far));
+            assert_eq!(planes.to_string().parse(), Ok(planes));
+        }
+        assert_eq!(ClipPlanes::NONE.to_string(), "none");
+        for text in ["", "1", "1,1", "2,1", "-1,2", "inf,inf", "nan,2", "0,nan", "a,b"] {
+            assert!(text.parse::<ClipPlanes>().is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn enclosing_touches_what_it_holds() {

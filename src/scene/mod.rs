@@ -24,7 +24,7 @@ pub mod settings;
 pub mod texture;
 
 pub use animation::AnimationRig;
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, ClipPlanes, Projection};
 pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, Portal};
 pub use lights::LightKind;

@@ -80,7 +80,7 @@ impl CameraControl {
         let forward = DVec3::new(heading.sin() * elevation.cos(), elevation.sin(), -heading.cos() * elevation.cos());
         let right = forward.cross(DVec3::Y).normalize();
         self.camera.camera_to_world.matrix3 = DMat3::from_cols(right, right.cross(forward), -forward);
-        self.camera.name.clear();
+        self.become_free();
     }
 
     /// Turns around the pivot by a drag of so many points.
@@ -116,7 +116,7 @@ impl CameraControl {
         let pivot = self.pivot();
         self.distance = (self.distance * factor).clamp(1e-6 * self.scene_size, 1e4 * self.scene_size);
         self.camera.camera_to_world.translation = pivot - self.forward() * self.distance;
-        self.camera.name.clear();
+        self.become_free();
     }
 
     /// Flies for some seconds: right, up and forward, each from -1 to 1.
@@ -136,7 +136,7 @@ impl CameraControl {
         }
         let camera = Camera::look_at(self.eye() + offset * 0.5, point, DVec3::Y, 1.0);
         self.camera.camera_to_world = camera.camera_to_world;
-        self.camera.name.clear();
+        self.become_free();
         self.distance = 0.5 * distance;
     }
 
@@ -146,7 +146,7 @@ impl CameraControl {
         let turned = DMat3::from_rotation_y(angle);
         let m = &mut self.camera.camera_to_world;
         *m = DAffine3::from_mat3_translation(turned * m.matrix3, pivot + turned * (m.translation - pivot));
-        self.camera.name.clear();
+        self.become_free();
     }
 
     /// Sets the vertical field of view, radians; without effect on orthographic cameras.
@@ -158,7 +158,13 @@ impl CameraControl {
 
     fn shift(&mut self, by: DVec3) {
         self.camera.camera_to_world.translation += by;
+        self.become_free();
+    }
+
+    /// It is no longer one of the file's, whose far clipping plane would hide the scene from whoever steps back.
+    fn become_free(&mut self) {
         self.camera.name.clear();
+        self.camera.clip.far = f64::INFINITY;
     }
 }
 

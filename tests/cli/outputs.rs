@@ -413,3 +413,44 @@ fn gpu_tev_shows_the_image_while_it_renders() {
     closes.join().unwrap();
     assert!(out.status.success() && stderr(&out).contains("--tev: the connection has ended"), "{}", stderr(&out));
 }
+
+/// A quad at depth 2 in front of another at depth 4, and a camera of another aspect ratio than other images.
+const CLIPPED: &str = r#"{
+    "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1, 2] }],
+    "nodes": [{ "mesh": 0, "translation": [0, 0, -2] }, { "mesh": 0, "translation": [0, 0, -4], "scale": [9, 9, 1] }, { "camera": 0 }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+    "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }],
+    "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+    "buffers": [{ "byteLength": 36, "uri": "data:;base64,AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAAAAAAAAgD8AAAAA" }],
+    "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.5, "aspectRatio": 4.0, "znear": 3.0, "zfar": 3.5 } }]
+}"#;
+
+#[test]
+fn gpu_images_follow_the_cameras_aspect_ratio_and_its_clipping_planes() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, image) = (place(&dir, "clipped.gltf"), place(&dir, "a.exr"));
+    std::fs::write(&scene, CLIPPED).unwrap();
+    let render = |args: &[&str]| {
+        let base = ["render", &scene, "--spp", "1", "--ao-radius", "1", "--aov", "depth", "--json", "-o", &image];
+        let record = json(&run(&[&base[..], args].concat()));
+        let image = load(&image);
+        let middle = (image.height / 2 * image.width + image.width / 2) as usize;
+        (record, [image.width, image.height], image.f32("depth.Z").unwrap()[middle])
+    };
+    let (record, size, depth) = render(&[]);
+    assert_eq!((size, depth), ([1920, 480], f32::INFINITY));
+    let said = record["choices"].to_string();
+    assert!(said.contains("image size: 1920x480") && said.contains("sees from 3 to 3.5"), "{said}");
+    let small = |clip: &'static str| render(&["--size", "16x4", "--clip", clip]);
+    for (clip, expected) in [("none", 2.0), ("3,inf", 4.0), ("1,3", 2.0)] {
+        let (record, size, depth) = small(clip);
+        // the middle of the image is a corner of four pixels
+        assert!(size == [16, 4] && (depth / expected - 1.0).abs() < 0.02, "{clip}: {depth}");
+        assert!(!record["choices"].to_string().contains("image size"));
+        assert_eq!(record["camera_pose"]["clip"].as_str(), Some(clip).filter(|c| *c != "none"));
+    }
+    refuses(&["render", &scene, "-o", &image, "--clip", "3,2"], 64, "expected NEAR,FAR");
+}

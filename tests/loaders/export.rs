@@ -21,6 +21,7 @@ fn two_triangles() -> TriangleMesh {
         colors: vec![Vec4::new(0.1, 0.2, 0.3, 1.0); 4],
         positions,
         indices: vec![[0, 1, 2], [2, 1, 3]],
+        ..TriangleMesh::default()
     }
 }
 
@@ -46,6 +47,7 @@ fn scene() -> Scene {
         metallic_roughness_texture: Some(turned),
         normal_texture: slot(1),
         normal_scale: 0.5,
+        occlusion_strength: 0.25,
         occlusion_texture: slot(0),
         emissive: Vec3::new(17.0, 12.0, 4.1),
         emissive_texture: slot(1),
@@ -114,6 +116,7 @@ fn scene() -> Scene {
                 name: "ortho".into(),
                 aspect: Some(1.5),
                 projection: Projection::Orthographic { half_height: 2.5 },
+                clip: ClipPlanes { near: 0.5, far: 20.0 },
                 ..Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 0.7)
             },
         ],
@@ -154,6 +157,9 @@ fn same(a: &Scene, b: &Scene) {
     }
     for (x, y) in a.cameras.iter().zip(&b.cameras) {
         assert_eq!((&x.name, x.projection, x.aspect), (&y.name, y.projection, y.aspect));
+        // a perspective camera of glTF has a near plane
+        let next_to_nothing = y.clip.near <= 0.01 && y.clip.far == f64::INFINITY;
+        assert!(y.clip == x.clip || x.clip == ClipPlanes::NONE && next_to_nothing, "{}", y.clip);
         assert!(x.camera_to_world.abs_diff_eq(y.camera_to_world, 1e-12));
     }
 }

@@ -147,7 +147,8 @@ mod tests {
 
     #[test]
     fn a_trembling_camera_moves_by_next_to_nothing() {
-        let camera = CameraRecord { camera_to_world: [[0.0; 4]; 3], view: [0.7, 0.4], orthographic: false };
+        let camera =
+            CameraRecord { camera_to_world: [[0.0; 4]; 3], view: [0.7, 0.4], orthographic: false, clip: [0.0, f32::INFINITY] };
         let moved = trembling(&camera, 1);
         assert!(moved != camera && trembling(&camera, 2) == camera);
         // pixels, at the border of a wide image

@@ -456,11 +456,12 @@ impl PathEstimator {
         })
     }
 
-    /// Sets the volumes that the camera is in. Rays of an orthographic camera or a lens count as starting at the camera's position.
+    /// Sets the volumes in which camera rays start: those around the middle of the near clipping plane, at the camera's position without one.
     fn find_camera_media(&mut self, camera: &CameraRecord) -> Result<()> {
         let Some(volumes) = &self.volumes else { return Ok(()) };
-        let eye = glam::DVec3::from_array([0, 1, 2].map(|row| f64::from(camera.camera_to_world[row][3])));
-        let camera_media = volumes.around(eye);
+        let near = camera.clip[0];
+        let start = camera.camera_to_world.map(|row| f64::from(row[3] - near * row[2]));
+        let camera_media = volumes.around(glam::DVec3::from_array(start));
         self.change_records(|record| record.camera_media = camera_media)
     }
 

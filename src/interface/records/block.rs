@@ -72,7 +72,11 @@ records! {
         known_hits: address,
         /// Log2 of the number of pixels beyond `cells` that are of a listed one.
         listed_bits: uint,
+        /// Distance of the near clipping plane along the view direction, scene units; 0: none.
+        clip_near: float,
+        /// Distance of the far clipping plane; 0: none.
+        clip_far: float,
         /// Padding to a multiple of 16 bytes.
-        reserved: uint[3],
+        reserved: uint,
     }
 }

@@ -15,5 +15,9 @@ records! {
         at: vec2,
         /// Address of the `BlockParams`.
         block: address,
+        /// Depth in clip space of the boxes around spheres, which no clipping plane cuts.
+        box_depth: float,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uint[3],
     }
 }

@@ -6,7 +6,7 @@ use crate::film::NoControl;
 use crate::integrators::rays::{self, Mode};
 use crate::ray::{Hit, Ray};
 use crate::renderer::survey::VisibleSurface;
-use crate::renderer::survey::rays::{camera_ray, visible_surfaces};
+use crate::renderer::survey::rays::{camera_ray, clipped, visible_surfaces};
 use crate::scene::{Camera, Geometry};
 use crate::tracer::Tracer;
 use glam::DVec3;
@@ -54,7 +54,10 @@ impl Interactive<'_> {
     /// Those of the device.
     pub fn pick(&self, camera: &Camera, at: [f64; 2], aspect: f64) -> Result<Option<Pick>> {
         let ray = camera_ray(camera, at, aspect);
-        Ok(self.closest_hits(&[ray])?.pop().flatten().map(|hit| self.describe(ray.0, ray.0 + ray.1 * f64::from(hit.t), &hit)))
+        let hit = self.closest_hits(&[ray])?.pop().flatten();
+        let [near, far] = clipped(camera, ray.1);
+        let hit = hit.filter(|hit| near + f64::from(hit.t) < far);
+        Ok(hit.map(|hit| self.describe(near + f64::from(hit.t), ray.0 + ray.1 * f64::from(hit.t), &hit)))
     }
 
     /// The closest hits of rays (origins and unit directions in world space); `None` for misses, and for all before the first view.
@@ -76,7 +79,7 @@ impl Interactive<'_> {
         Ok(visible_surfaces(self.scene, rays, self.closest_hits(rays)?))
     }
 
-    fn describe(&self, eye: DVec3, position: DVec3, hit: &Hit) -> Pick {
+    fn describe(&self, distance: f64, position: DVec3, hit: &Hit) -> Pick {
         let scene = self.scene;
         let instance = &scene.instances[hit.instance as usize];
         let mesh = &scene.meshes[instance.mesh];
@@ -90,7 +93,7 @@ impl Interactive<'_> {
         textures.dedup();
         Pick {
             position,
-            distance: (position - eye).length(),
+            distance,
             instance: (hit.instance as usize, instance.name.clone()),
             mesh: (instance.mesh, mesh.name.clone()),
             primitive: (hit.primitive as usize, primitives),

@@ -26,7 +26,7 @@ use crate::renderer::frames::{
     pipeline, settling_frames,
 };
 use crate::renderer::settings::CameraSettings;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, ClipPlanes, Projection};
 
 /// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second on two cores.
 const CPU_LAUNCH_RAYS: u32 = 1 << 17;
@@ -476,6 +476,7 @@ pub fn camera_placement(camera: &Camera) -> CameraSettings {
         target: Some(eye + forward * distance),
         up: Some(to_world.matrix3.y_axis),
         fov_y,
+        clip: Some(camera.clip).filter(|clip| *clip != ClipPlanes::NONE),
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::framing::rounded;
-use super::rays::camera_ray;
+use super::rays::{camera_ray, clip};
 use super::{Survey, significant};
 use crate::error::{Error, Result};
 use crate::integrators::lighting::LightingSettings;
@@ -35,10 +35,12 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
     let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
+    let mut seen = survey.trace(&views)?;
+    clip(camera, &views, &mut seen);
     // Of each surface: irradiance by a lamp of one candela, without shadows (next to the camera it has few that are seen), and about how much it reflects.
     let mut lit: Vec<(f64, f64)> = views
         .iter()
-        .zip(survey.trace(&views)?)
+        .zip(seen)
         .filter_map(|((from, direction), seen)| {
             let seen = seen?;
             let to_lamp = lamp - (*from + *direction * seen.distance);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::rays::camera_ray;
+use super::rays::{camera_ray, clip};
 use super::{Trace, significant};
 use crate::error::Result;
 use crate::scene::Camera;
@@ -42,7 +42,8 @@ pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
     let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
-    let seen = trace(&views)?;
+    let mut seen = trace(&views)?;
+    clip(camera, &views, &mut seen);
     let surfaces = views.iter().zip(seen).filter_map(|(ray, seen)| Some((ray, seen?)));
     let mut rays = Vec::new();
     for (&(from, direction), surface) in surfaces {

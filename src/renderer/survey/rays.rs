@@ -6,9 +6,27 @@ use super::VisibleSurface;
 use crate::ray::Hit;
 use crate::scene::{Camera, Geometry, Projection, Scene};
 
-/// The ray through a point of the image, in world space: `at` from the top left, (0, 0), to the bottom right, (1, 1). `aspect` is width over height. Returns origin
-/// and unit direction.
+/// Distances along a ray from the camera at which it passes the clipping planes. `direction` has unit length.
+pub fn clipped(camera: &Camera, direction: DVec3) -> [f64; 2] {
+    camera.clip.of_ray(-camera.camera_to_world.matrix3.z_axis.dot(direction))
+}
+
+/// Removes what lies beyond the far clipping plane from what the rays of a camera ([`camera_ray`]) see.
+pub fn clip(camera: &Camera, rays: &[(DVec3, DVec3)], seen: &mut [Option<VisibleSurface>]) {
+    for ((_, direction), seen) in rays.iter().zip(seen.iter_mut()) {
+        let [near, far] = clipped(camera, *direction);
+        *seen = seen.filter(|surface| near + surface.distance < far);
+    }
+}
+
+/// The ray through a point of the image, in world space: `at` from the top left, (0, 0), to the bottom right, (1, 1). `aspect` is width over height. Returns origin,
+/// on the near clipping plane, and unit direction.
 pub fn camera_ray(camera: &Camera, at: [f64; 2], aspect: f64) -> (DVec3, DVec3) {
+    let (origin, direction) = unclipped_ray(camera, at, aspect);
+    (origin + direction * clipped(camera, direction)[0], direction)
+}
+
+fn unclipped_ray(camera: &Camera, at: [f64; 2], aspect: f64) -> (DVec3, DVec3) {
     let to_world = &camera.camera_to_world;
     let (x, y) = (2.0 * at[0] - 1.0, 1.0 - 2.0 * at[1]);
     let [right, up, back] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];

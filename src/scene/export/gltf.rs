@@ -13,7 +13,7 @@ use super::{ExportStats, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::VertexData;
 use crate::scene::{
-    Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
+    Camera, ClipPlanes, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
 };
 
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
@@ -151,7 +151,9 @@ impl Writer {
             }
             lights.push(written);
         }
-        let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
+        let diagonal = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).length());
+        let nothing = ClipPlanes { near: 0.01f64.min(1e-4 * diagonal.max(1e-30)), far: 1e6f64.max(1e3 * diagonal) };
+        let cameras: Vec<Value> = scene.cameras.iter().map(|c| camera(c, nothing)).collect();
         nodes.extend(scene.cameras.iter().enumerate().filter_map(|(i, c)| {
             if rig.is_some_and(|r| rig::carries_camera(r, i).is_some()) {
                 return None;
@@ -387,10 +389,16 @@ fn with_mesh(name: &str, mesh: usize, to_world: &DAffine3) -> Value {
     node
 }
 
-fn camera(camera: &Camera) -> Value {
+/// `nothing`: planes that clip next to nothing, for cameras without: glTF wants a near plane of perspective ones, and both of orthographic ones.
+fn camera(camera: &Camera, nothing: ClipPlanes) -> Value {
+    let clip = camera.clip;
+    let far = if clip.far.is_finite() { clip.far } else { nothing.far };
     match camera.projection {
         Projection::Perspective { fov_y } => {
-            let mut perspective = json!({ "yfov": fov_y, "znear": 0.01 });
+            let mut perspective = json!({ "yfov": fov_y, "znear": if clip.near > 0.0 { clip.near } else { nothing.near } });
+            if clip.far.is_finite() {
+                perspective["zfar"] = json!(clip.far);
+            }
             if let Some(aspect) = camera.aspect {
                 perspective["aspectRatio"] = json!(aspect);
             }
@@ -398,7 +406,7 @@ fn camera(camera: &Camera) -> Value {
         }
         Projection::Orthographic { half_height } => {
             let xmag = half_height * camera.aspect.unwrap_or(1.0);
-            let orthographic = json!({ "xmag": xmag, "ymag": half_height, "znear": 0.0, "zfar": 1e6 });
+            let orthographic = json!({ "xmag": xmag, "ymag": half_height, "znear": clip.near, "zfar": far });
             json!({ "name": camera.name, "type": "orthographic", "orthographic": orthographic })
         }
     }

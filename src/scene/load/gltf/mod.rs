@@ -98,7 +98,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
             }
         }
         if let Some(index) = node.camera {
-            match node::camera(&document, &doubles, placed, index.value()) {
+            match node::camera(&document, &doubles, placed, index.value(), &mut |w| warnings.push(w)) {
                 Ok(camera) => {
                     scene.cameras.push(camera);
                     stage.cameras.push(Some(at));

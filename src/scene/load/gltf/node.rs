@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::{text, valid};
 use crate::scene::animation::LocalTransform;
 use crate::scene::camera::rigid;
-use crate::scene::{Camera, Light, LightKind, Projection};
+use crate::scene::{Camera, ClipPlanes, Light, LightKind, Projection};
 
 /// Transforms and cameras in double precision: the crate rounds them to single precision, which is too coarse for far-away scenes
 /// and would not survive a round trip through our exporter.
@@ -44,12 +44,16 @@ struct CameraJson {
 struct Perspective {
     yfov: f64,
     aspect_ratio: Option<f64>,
+    znear: Option<f64>,
+    zfar: Option<f64>,
 }
 
 #[derive(Deserialize)]
 struct Orthographic {
     xmag: f64,
     ymag: f64,
+    znear: Option<f64>,
+    zfar: Option<f64>,
 }
 
 /// A node of the hierarchy with its world transform.
@@ -149,11 +153,28 @@ fn local(node: &Transform, index: usize) -> Result<LocalTransform, String> {
     })
 }
 
+/// The clipping planes of a camera; numbers that bound nothing count as absent.
+fn clip_planes(near: Option<f64>, far: Option<f64>, warn: &mut dyn FnMut(String)) -> ClipPlanes {
+    let near = near.filter(|near| near.is_finite() && *near > 0.0).unwrap_or(0.0);
+    let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
+    if far > near {
+        return ClipPlanes { near, far };
+    }
+    warn(format!("has its far plane ({far}) before its near plane ({near}): nothing is clipped"));
+    ClipPlanes::NONE
+}
+
 /// The camera of a node.
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &PlacedNode, index: usize) -> Result<Camera, String> {
+pub(super) fn camera(
+    document: &Root,
+    doubles: &Doubles,
+    placed: &PlacedNode,
+    index: usize,
+    warn: &mut dyn FnMut(String),
+) -> Result<Camera, String> {
     let (Some(camera), Some(lens)) = (document.cameras.get(index), doubles.cameras.get(index)) else {
         return Err(format!("camera {index} does not exist"));
     };
@@ -169,10 +190,16 @@ pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &PlacedNode, in
         },
         (None, None) => return Err(format!("camera {index} is neither perspective nor orthographic")),
     };
+    let (near, far) = match (&lens.perspective, &lens.orthographic) {
+        (Some(p), _) => (p.znear, p.zfar),
+        (None, Some(o)) => (o.znear, o.zfar),
+        (None, None) => (None, None),
+    };
+    let clip = clip_planes(near, far, &mut |text| warn(format!("camera {index} {text}")));
     let node = &document.nodes[placed.node];
     // the node tells apart the uses of one camera
     let name = [&node.name, &camera.name].map(text).into_iter().find(|n| !n.is_empty()).unwrap_or_default();
-    Ok(Camera { name: name.to_owned(), camera_to_world: rigid(&placed.to_world), projection, aspect })
+    Ok(Camera { name: name.to_owned(), camera_to_world: rigid(&placed.to_world), projection, aspect, clip })
 }
 
 /// The punctual light of a node.
