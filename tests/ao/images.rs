@@ -13,7 +13,7 @@ use skylit::oracle::ao as oracle_ao;
 use skylit::oracle::camera::camera_ray;
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::{CAMERA_FILM, Sampler, to_unit};
-use skylit::scene::{Camera, Projection, Scene};
+use skylit::scene::{Camera, ClipPlanes, Projection, Scene};
 use skylit::tracer::{Kernel, Needs, Tracer, TracerKind};
 
 use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
@@ -79,6 +79,30 @@ fn gpu_images_of_any_size() {
         for spp in [1, 3] {
             let options = AoOptions { size, spp, ..Default::default() };
             compare_with_oracle(&device, &format!("{size:?} at {spp}"), &scene, &scene.cameras[0], &options);
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// Geometry before the near plane and beyond the far one is not there for the camera, and shades what is.
+#[test]
+fn gpu_clipped_images() {
+    let device = device();
+    for name in ["leaf-cards", "cornell-spheres"] {
+        let scene = scene(name);
+        let camera = &scene.cameras[0];
+        let flat = Camera { projection: Projection::Orthographic { half_height: 2.0 }, ..camera.clone() };
+        let options = AoOptions { size: [48, 36], spp: 4, seed: 5, ..Default::default() };
+        let oracle = Oracle::new(&scene, scene.origin());
+        let middle = oracle.closest(camera_ray(camera, scene.origin(), [1, 1], [0.5, 0.5])).t;
+        assert!(middle.is_finite());
+        for (camera, planes) in [
+            (camera, ClipPlanes { near: 0.97 * middle, far: f64::INFINITY }),
+            (camera, ClipPlanes { near: 0.1 * middle, far: 1.02 * middle }),
+            (&flat, ClipPlanes { near: 0.97 * middle, far: 1.1 * middle }),
+        ] {
+            let camera = Camera { clip: planes, ..camera.clone() };
+            compare_with_oracle(&device, &format!("{name}, {planes}"), &scene, &camera, &options);
         }
     }
     assert_validation_clean(&device);
