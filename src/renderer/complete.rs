@@ -60,18 +60,19 @@ impl Renderer {
         if !stays {
             self.light(&settings.lighting)?;
         }
-        let mut choices = Vec::new();
+        let (mut chosen, mut choices) = (RenderSettings::default(), Vec::new());
         let mut settings = settings.clone();
+
+        // the size
         if let Some((size, sentence)) = size_of_camera(&settings, &self.scene).filter(|_| camera.is_none()) {
             settings.image.size = Some(size);
+            chosen.image.size = Some(size);
             choices.push(sentence);
         }
         let size = settings.size(&self.scene);
         crate::output::check_size(size[0], size[1])?;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let survey = Survey::new(&self.scene);
-        let (mut chosen, mut choices) = (RenderSettings::default(), Vec::new());
-        let mut settings = settings.clone();
 
         // the camera, by which the others are chosen
         let found = if camera.is_some() { None } else { settings.camera.automatic(&survey, aspect)? };
