@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::report;
 use crate::settings::parse::parse_seconds;
-use crate::terminal::console::{Console, command_line};
+use crate::terminal::console::{Console, command_line, visible};
 
 /// Options of `skylit bench` that do not depend on what is measured.
 #[derive(Clone, Debug, Args)]
@@ -143,8 +143,13 @@ impl CommonArgs {
     /// # Errors
     /// The first error.
     pub fn write_tables<R: BenchRecord>(&self, json: &JsonRecord<R>) -> Result<()> {
-        let write_csv =
-            |path: &Path| files::write_atomically(path, |f| json.record.write_csv(f).map_err(std::io::Error::other));
+        let write_csv = |path: &Path| {
+            let mut text = Vec::new();
+            json.record.write_csv(&mut text).map_err(|e| Error::write(path, &std::io::Error::other(e)))?;
+            // names of others have no control characters
+            let text = visible(&String::from_utf8_lossy(&text), &['\n']);
+            files::write_atomically(path, |f| f.write_all(text.as_bytes()))
+        };
         let csv = self.csv.as_deref().map_or(Ok(()), write_csv);
         self.outputs.write_json(json).and(csv)
     }

@@ -57,7 +57,7 @@ impl<'a> DeviceRecord<'a> {
 
 fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind)>) {
     let mut line = |s: String| {
-        text.push_str(&s);
+        text.push_str(&console::visible(&s, &[]));
         text.push('\n');
     };
     let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (selected)" } else { "" };

@@ -1,4 +1,7 @@
 //! Terminal output: results on stdout, everything else on stderr. A closed pipe is not an error.
+//!
+//! All that the program prints goes through [`print`], [`json`], [`error`] and [`note`]. What files call their cameras, channels or settings is a part of it, so none of
+//! them lets a character through that a terminal obeys.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -53,7 +56,7 @@ pub struct Console {
 impl Console {
     /// Prints a line of the result in text mode.
     pub fn line(&self, text: &str) -> Result<()> {
-        if self.json || self.quiet { Ok(()) } else { print(&format!("{text}\n")) }
+        if self.json || self.quiet { Ok(()) } else { print(&(visible(text, &[]) + "\n")) }
     }
 
     /// Prints the result as a record in JSON mode.
@@ -97,9 +100,20 @@ impl Console {
     }
 }
 
-/// Replaces line breaks, other control characters and runs of white space by single spaces.
+/// Returns true for characters that a terminal obeys instead of showing them: control characters, line and paragraph separators, and those that reorder a line.
+fn is_obeyed(c: char) -> bool {
+    let reorders = matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || reorders
+}
+
+/// Replaces line breaks, other characters that a terminal obeys and runs of white space by single spaces.
 pub fn one_line(text: &str) -> String {
-    text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
+    text.split(|c: char| c.is_whitespace() || is_obeyed(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// Replaces each character that a terminal obeys by a space, except those of `kept`: columns stay where they are.
+pub fn visible(text: &str, kept: &[char]) -> String {
+    text.chars().map(|c| if is_obeyed(c) && !kept.contains(&c) { ' ' } else { c }).collect()
 }
 
 /// The command line of this process, quoted as a shell needs it.
@@ -121,11 +135,15 @@ pub fn note(text: &str) {
 
 fn stderr(line: &str) {
     // not eprintln!, which panics when stderr is closed
-    let _ = writeln!(io::stderr().lock(), "{line}");
+    let _ = writeln!(io::stderr().lock(), "{}", visible(line, &[]));
 }
 
-/// Writes to stdout.
+/// Writes lines to stdout.
 pub fn print(text: &str) -> Result<()> {
+    write(&visible(text, &['\n', '\t']))
+}
+
+fn write(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Error::write("standard output", &e)),
@@ -137,5 +155,37 @@ pub fn print(text: &str) -> Result<()> {
 pub fn json(value: &impl Serialize) -> Result<()> {
     let text =
         serde_json::to_string(value).map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-    print(&(text + "\n"))
+    write(&(escaped(&text) + "\n"))
+}
+
+/// JSON whose strings have escapes for all that a terminal obeys; the format itself requires them for some only.
+fn escaped(json: &str) -> String {
+    use std::fmt::Write;
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        match is_obeyed(c) {
+            // writing to a string does not fail
+            true => drop(write!(out, "\\u{:04x}", u32::from(c))),
+            false => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EVIL: &str = "a\x1b[31m\u{9b}2J\u{202e}b\r\nc\x07";
+
+    #[test]
+    fn nothing_that_a_terminal_obeys_is_printed() {
+        assert_eq!(one_line(EVIL), "a [31m 2J b c");
+        assert_eq!(visible(EVIL, &[]), "a [31m 2J b  c ");
+        assert_eq!(visible("a\tb\n c\x1b", &['\n', '\t']), "a\tb\n c ");
+        let value = serde_json::json!({ "name": EVIL });
+        let text = escaped(&value.to_string());
+        assert!(!text.chars().any(is_obeyed), "{text}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value, "it says the same");
+    }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use crate::terminal::console::{Console, note};
+use crate::terminal::console::{Console, note, visible};
 
 /// Time after which the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -92,8 +92,9 @@ impl Progress {
             }
             bar.with_elapsed(self.start.elapsed())
         });
-        if bar.message() != self.label {
-            bar.set_message(self.label.clone());
+        let label = visible(&self.label, &[]);
+        if bar.message() != label {
+            bar.set_message(label);
         }
         bar.set_length(total);
         bar.set_position(done);

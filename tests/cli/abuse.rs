@@ -2,11 +2,14 @@
 //! processes, clocks. Each ends with one line and its exit code, with nothing half-written and no temporary file left (docs/robustness.md).
 
 use std::ffi::OsString;
+use std::io::Read;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant, SystemTime};
+
+use skylit::output::{self, Channel, Image, Samples};
 
 use crate::common::command::{assert_refusal, count, device, fails, json, place, run, skylit, stderr};
 
@@ -520,6 +523,40 @@ fn gpu_a_second_signal_ends_at_once() {
     assert!(start.elapsed() < Duration::from_secs(3) && count(dir.path()) == 0, "{:?}", start.elapsed());
 }
 
+/// A viewer that reads a little now and then keeps every write alive: Ctrl-C ends the wait all the same.
+#[test]
+fn gpu_a_viewer_that_drips_can_be_interrupted() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let exr = place(&dir, "a.exr");
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let (sender, connected) = std::sync::mpsc::channel();
+    let drips = std::thread::spawn(move || {
+        let (mut connection, _) = listener.accept().unwrap();
+        let mut buffer = vec![0; 100_000];
+        let mut is_first = true;
+        while connection.read(&mut buffer).is_ok_and(|n| n > 0) {
+            // the image is on its way
+            if std::mem::take(&mut is_first) {
+                sender.send(()).unwrap();
+            }
+            std::thread::sleep(Duration::from_millis(300));
+        }
+    });
+    let args = ["render", "builtin:plane", "--size", "1600x1200", "--spp", "1", "-o", &exr, "--tev", &address];
+    let child = skylit(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    connected.recv_timeout(Duration::from_secs(60)).unwrap();
+    let start = Instant::now();
+    signal(&child, "INT");
+    let out = child.wait_with_output().unwrap();
+    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    assert!(matches!(out.status.code(), Some(0 | 130)), "{}", stderr(&out));
+    drips.join().unwrap();
+}
+
 /// Several processes write one output and fill one cache: the output is that of one of them, and the cache is whole.
 #[test]
 fn gpu_processes_side_by_side() {
@@ -553,6 +590,46 @@ fn gpu_processes_side_by_side() {
     let temporary = |folder: &str| names(folder.as_ref()).iter().any(|f| f.as_bytes().ends_with(b".tmp"));
     assert!(!temporary(&kept) && !temporary(&place(&dir, "cache/skylit")) && count(kept.as_ref()) == 1);
     assert_eq!(names(dir.path()), ["1.exr", "2.exr", "3.exr", "a.exr", "cache", "kept"]);
+}
+
+/// What files call their things is shown as text, whatever a terminal would make of it.
+#[test]
+fn names_cannot_command_a_terminal() {
+    let dir = tempfile::tempdir().unwrap();
+    let evil = "a\u{1b}[31m\u{9b}2J\u{202e}b\nc\r\u{7}";
+    let gltf = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "name": evil, "nodes": [0] }],
+        "nodes": [{ "name": evil, "camera": 0, "mesh": 0 }],
+        "cameras": [{ "name": evil, "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }],
+        "meshes": [{ "name": evil, "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+        "materials": [{ "name": evil }],
+        "animations": [],
+        "extensionsUsed": [evil],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }],
+    });
+    let scene = place(&dir, "evil.gltf");
+    std::fs::write(&scene, gltf.to_string()).unwrap();
+    let channel = |value: f32| Channel { name: "a\u{1b}[31m\nb".into(), samples: Samples::F32(vec![value; 4]) };
+    let exr = place(&dir, "evil.exr");
+    output::save(&Image { width: 2, height: 2, channels: vec![channel(0.5)], metadata: Vec::new() }, exr.as_ref()).unwrap();
+    std::fs::write(dir.path().join("skylit.toml"), "\"a\\u001b[31m\\u009bb\" = 1\n").unwrap();
+    for args in [
+        &["info", &scene, "--no-device"][..],
+        &["info", &scene, "--no-device", "--json"],
+        &["diff", &exr, &exr],
+        &["diff", &exr, &exr, "--json"],
+        &["render", &scene, "--camera", evil, "-o", "a.tga"],
+    ] {
+        let out = run(args);
+        let text = String::from_utf8([out.stdout, out.stderr].concat()).unwrap();
+        let obeyed = |c: char| c.is_control() && c != '\n' || c == '\u{202e}';
+        assert!(!text.chars().any(obeyed), "{args:?}: {text:?}");
+        assert!(!text.lines().any(|line| line.starts_with("c ") || line.starts_with("b ") || line == "b"), "{args:?}: {text}");
+    }
 }
 
 /// Numbers have points, whatever the locale writes.

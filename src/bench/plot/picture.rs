@@ -13,6 +13,7 @@ use super::draw;
 use super::layout::Layout;
 use super::panel::Plot;
 use crate::error::{Error, Result};
+use crate::terminal::console::visible;
 use crate::{files, output};
 
 /// Pixels of a PNG for each unit of the layout.
@@ -96,7 +97,8 @@ pub fn svg(plot: &Plot) -> Result<String> {
     let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
     draw::plot(plot, &layout, &area)?;
     drop(area);
-    Ok(text)
+    // XML has no place for control characters, not even as references
+    Ok(visible(&text, &['\n', '\t']))
 }
 
 fn register_fonts() -> Result<()> {
@@ -151,6 +153,10 @@ mod tests {
 
     #[test]
     fn text_of_an_svg_is_text() {
+        let mut evil = panel(&[(1.0, 2.0), (2.0, 3.0)], Mark::Discs);
+        evil.title = "a\x1b[31m\u{9b}b\x00".into();
+        let text = svg(&plot(vec![evil])).unwrap();
+        assert!(!text.chars().any(|c| c.is_control() && c != '\n'), "{text}");
         let text = svg(&plot(vec![panel(&[(1.0, 2.0), (100.0, 0.001)], Mark::Discs)])).unwrap();
         assert!(text.contains("A &lt;title&gt;") && text.contains("<text") && text.ends_with("</svg>\n"), "{text}");
         // no number is written beside an axis twice

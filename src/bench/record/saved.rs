@@ -11,6 +11,7 @@ use super::rays::RayBenchmark;
 use super::snapshot::{Comparable, Snapshot};
 use super::{BenchKind, Completeness, HostInfo};
 use crate::error::{Error, Result};
+use crate::terminal::console::one_line;
 
 /// A record of one of the benchmarks.
 #[derive(Clone, Debug)]
@@ -33,7 +34,8 @@ impl SavedRecord {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
         let broken = |why: String| Error::input(path, format!("is no record of `skylit bench`: {why}"));
-        let value: Value = serde_json::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        let mut value: Value = serde_json::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        clean(&mut value);
         let kind = kind_of(&value).ok_or_else(|| broken("it does not say which benchmark it is of".into()))?;
         let record = match kind {
             BenchKind::Rays => serde_json::from_value(value).map(Self::Rays),
@@ -82,6 +84,16 @@ impl SavedRecord {
             Self::Path(r) => r.snapshot(),
             Self::Frames(r) => r.snapshot(),
         }
+    }
+}
+
+/// Makes lines of all texts: names go into tables, pages and plots.
+fn clean(value: &mut Value) {
+    match value {
+        Value::String(text) if text.chars().any(char::is_control) => *text = one_line(text),
+        Value::Array(all) => all.iter_mut().for_each(clean),
+        Value::Object(map) => map.values_mut().for_each(clean),
+        _ => {}
     }
 }
 

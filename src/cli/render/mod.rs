@@ -11,7 +11,7 @@ use std::time::Instant;
 
 pub use args::RenderArgs;
 use frame_files::{FrameContents, FrameFiles};
-use tev::TevViewer;
+use tev::{SendError, TevViewer};
 
 use super::config;
 use crate::error::{Error, Result};
@@ -223,10 +223,15 @@ impl Viewer {
 
     fn show(&mut self, image: &Image) {
         let Some(tev) = &mut self.tev else { return };
-        if let Err(e) = tev.send(image) {
-            let warning = format!("--tev: the connection has ended ({e}); the image is not shown any more");
-            self.console.warning(&warning);
-            (self.tev, self.warning) = (None, Some(warning));
+        match tev.send(image) {
+            Ok(()) => {}
+            // whoever renders stops, too, and says so
+            Err(SendError::Interrupted) => self.tev = None,
+            Err(SendError::Failed(why)) => {
+                let warning = format!("--tev: the connection has ended ({why}); the image is not shown any more");
+                self.console.warning(&warning);
+                (self.tev, self.warning) = (None, Some(warning));
+            }
         }
     }
 }
