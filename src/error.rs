@@ -95,7 +95,7 @@ impl Error {
             std::io::ErrorKind::NotFound => "no such file".to_owned(),
             std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
             std::io::ErrorKind::IsADirectory => "is a folder, not a file".to_owned(),
-            std::io::ErrorKind::UnexpectedEof => "ends too early (truncated?)".to_owned(),
+            std::io::ErrorKind::UnexpectedEof => "ends early: it was cut off".to_owned(),
             _ => format!("cannot read: {error}"),
         };
         Self::input(path, message)
@@ -105,6 +105,10 @@ impl Error {
     pub fn write(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
         let message = match error.kind() {
             std::io::ErrorKind::StorageFull => "the disk is full".to_owned(),
+            std::io::ErrorKind::QuotaExceeded => "the disk quota is used up".to_owned(),
+            std::io::ErrorKind::FileTooLarge => {
+                "it would be larger than files may be here: raise the limit (`ulimit -f unlimited`), or write less".to_owned()
+            }
             std::io::ErrorKind::NotFound => "its folder does not exist (create it first)".to_owned(),
             std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
             std::io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".to_owned(),

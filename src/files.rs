@@ -1,14 +1,77 @@
-//! Atomic file output, and the cache folder.
+//! Reading of whole files, atomic file output, and the cache folder.
+//!
+//! Readers say what lies in a file's place where it is not the file itself: a pointer of Git LFS or git-annex, a web page, nothing.
 //!
 //! A file is written without a name in the folder of its target, where the system has such files (Linux: `O_TMPFILE`), and gets its name once it is complete: whatever ends
 //! the process, no incomplete file and no temporary file stays. Elsewhere it is written under a name of its own next to its target, and renamed.
 
 use std::borrow::Cow;
 use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, Seek};
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+
+/// Number of first bytes by which a file is told from what others put in its place.
+const START: u64 = 1024;
+
+/// Reads a file whole.
+///
+/// # Errors
+/// [`Error::Input`] for a file that cannot be read, is empty, or holds something else in its place ([`placeholder`]).
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    let bytes = fs::read(path).map_err(|e| Error::read(path, &e))?;
+    match placeholder(&bytes) {
+        Some(message) => Err(Error::input(path, message)),
+        None => Ok(bytes),
+    }
+}
+
+/// Reads a file of UTF-8 text whole; an empty one is empty text.
+///
+/// # Errors
+/// [`Error::Input`] as [`read`] has it, and for bytes that are no UTF-8.
+pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
+    let path = path.as_ref();
+    let text = fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+    match placeholder(text.as_bytes()).filter(|_| !text.is_empty()) {
+        Some(message) => Err(Error::input(path, message)),
+        None => Ok(text),
+    }
+}
+
+/// The first bytes of a file, for readers that do not take it whole: enough to tell formats by their signatures.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_start(path: impl AsRef<Path>) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(START).read_to_end(&mut start));
+    read.map_err(|e| Error::read(path, &e))?;
+    match placeholder(&start) {
+        Some(message) => Err(Error::input(path, message)),
+        None => Ok(start),
+    }
+}
+
+/// What lies in the place of a file that begins with these bytes, and the remedy, as the end of a sentence; `None` if it may be the file itself.
+pub fn placeholder(bytes: &[u8]) -> Option<&'static str> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let begins = |word: &str| text.get(..word.len()).is_some_and(|t| t.eq_ignore_ascii_case(word.as_bytes()));
+    if bytes.is_empty() {
+        Some("is empty: it has no bytes (a copy or download that failed?)")
+    } else if begins("version https://git-lfs.github.com/spec/") || begins("version https://hawser.github.com/spec/") {
+        Some("is a Git LFS pointer in place of the file itself: fetch that with `git lfs pull`")
+    } else if bytes.len() < 512 && begins("/annex/objects/") {
+        Some("is a git-annex pointer in place of the file itself: fetch that with `git annex get`")
+    } else if begins("<!doctype html") || begins("<html") {
+        Some("is an HTML page in place of the file itself (a download that needs a login, or a page about the file?)")
+    } else {
+        None
+    }
+}
 
 /// What a path refers to, and how to write it.
 enum Target {
@@ -303,6 +366,31 @@ pub fn cache_folder() -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_lies_in_the_place_of_a_file() {
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a214614ab2935\nsize 12345\n";
+        let says = [
+            (&b""[..], "is empty"),
+            (pointer, "is a Git LFS pointer"),
+            (b"version https://hawser.github.com/spec/v1\noid sha256:4d\nsize 1\n", "is a Git LFS pointer"),
+            (b"/annex/objects/SHA256E-s31--4d.png\n", "is a git-annex pointer"),
+            (b"\xef\xbb\xbf \r\n<!DOCTYPE html>\n<html>", "is an HTML page"),
+            (b"<HTML><HEAD>", "is an HTML page"),
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        for (bytes, words) in says {
+            fs::write(&path, bytes).unwrap();
+            assert!(read(&path).unwrap_err().to_string().contains(words), "{words}");
+            assert!(read_start(&path).unwrap_err().to_string().contains(words), "{words}");
+            assert!(bytes.is_empty() || read_text(&path).unwrap_err().to_string().contains(words), "{words}");
+        }
+        for bytes in [&b"glTF"[..], b"{}", b"# version https://git-lfs", b"\n\n", b"<htm"] {
+            assert_eq!(placeholder(bytes), None);
+        }
+        assert_eq!(read_text(Path::new("/dev/null")).unwrap_or_default(), "");
+    }
 
     #[test]
     fn names_without_the_folders_of_a_machine() {

@@ -105,13 +105,13 @@ pub struct DiffArgs {
     pub a: PathBuf,
     /// Second image: the reference, for metrics that are not symmetric
     pub b: PathBuf,
-    /// Fail (exit code 1) if the RMSE of a compared channel exceeds this
+    /// Fail (exit code 1) if the RMSE of a compared channel exceeds this; without it only NaN and images with no pixel to compare fail
     #[arg(long, value_name = "X", value_parser = parse_limit, allow_hyphen_values = true)]
     pub max_rmse: Option<f64>,
     /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels; the others are only listed]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub channels: Vec<String>,
-    /// Compare all pixels, also those that neither image covers
+    /// Compare all pixels, also black ones that neither image covers
     #[arg(long)]
     pub all_pixels: bool,
     /// How results are shown

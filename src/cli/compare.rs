@@ -16,7 +16,7 @@ use crate::files;
 use crate::film::Control;
 use crate::integrators::IntegratorSettings;
 use crate::integrators::lighting::LightingSettings;
-use crate::measure::comparison::CompareOptions;
+use crate::measure::comparison::{CompareOptions, Comparison};
 use crate::measure::mask::MaskOptions;
 use crate::output::{self, Image};
 use crate::realtime::frame_settings::FrameSettings;
@@ -263,7 +263,11 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
     record["pictures"] = json!(files::lossy(&pictures));
     record["report"] = json!(index.as_ref().map(|path| path.to_string_lossy()));
     record["warnings"] = json!(warnings.list);
-    console.close(&record, Ok(()))
+    let check = |(k, _, comparison): (usize, _, &Comparison)| {
+        let name = |e: Error| Error::CheckFailed(format!("{} and {}: {e}", letter(k), letter(args.reference)));
+        comparison.check().map_err(name)
+    };
+    console.close(&record, set.judged().try_for_each(check))
 }
 
 /// Loads or renders all images.

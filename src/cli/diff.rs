@@ -46,10 +46,9 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         mask: MaskOptions { covered: !args.all_pixels, ..Default::default() },
     };
     let compared = comparison::compare(&a, &b, &options)?;
-    let mask = options.mask.coverage(&a, &b)?;
     let mut records = Vec::new();
     for (x, y) in &pairs(&a, &b) {
-        let d = compare(&x.samples, &y.samples, &mask)?;
+        let d = compare(&x.samples, &y.samples, &compared.maps.mask)?;
         console.line(&format!("{:12} {}", x.name, difference_text(&d)))?;
         let mut record = json!(d);
         record["channel"] = json!(x.name);
@@ -62,27 +61,25 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let record = json!({
         "a": args.a,
         "b": args.b,
+        "mask": compared.mask,
         "covered_pixels_only": !args.all_pixels && a.f32("A").is_some() && b.f32("A").is_some(),
         "channels": records,
         "flip": flip,
         "compared": compared,
     });
-    console.close(&record, args.max_rmse.map_or(Ok(()), |limit| judge(&compared, limit)))
+    console.close(&record, judge(&compared, args.max_rmse))
 }
 
-/// Fails if a compared channel differs by more than the limit, or a pixel is finite in one image only.
-fn judge(compared: &Comparison, limit: f64) -> Result<()> {
-    if compared.bad.not_finite() > 0 {
-        let pixels = compared.bad.not_finite();
-        return Err(Error::CheckFailed(format!("the images differ: {pixels} pixels are finite in one of them only")));
+/// Fails if nothing can be compared, a pixel is broken, or a compared channel differs by more than the limit, if there is one.
+fn judge(compared: &Comparison, limit: Option<f64>) -> Result<()> {
+    compared.check()?;
+    let Some(limit) = limit else { return Ok(()) };
+    // a limit that NaN is compared with does not hold
+    if compared.channel_rmse.iter().all(|e| *e <= limit) {
+        return Ok(());
     }
-    // NaN where no pixel is compared: nothing can differ there
-    match compared.channel_rmse.iter().copied().filter(|e| !e.is_nan()).fold(0.0, f64::max) {
-        worst if worst > limit => {
-            Err(Error::CheckFailed(format!("the images differ by an RMSE of {worst:.3e}, more than {limit:e}")))
-        }
-        _ => Ok(()),
-    }
+    let worst = compared.channel_rmse.iter().copied().fold(f64::NAN, f64::max);
+    Err(Error::CheckFailed(format!("the images differ by an RMSE of {worst:.3e}, more than {limit:e}")))
 }
 
 /// How far a channel is from the reference's, in a line.
@@ -104,6 +101,9 @@ fn difference_text(d: &ChannelDifference) -> String {
 
 /// What was compared, in a line.
 fn summary(c: &Comparison) -> String {
+    if c.pixels == 0 {
+        return format!("{}: no pixel to compare, over {}", c.channels.join(" "), c.mask);
+    }
     let error = if c.bias_standard_error > 0.0 { format!(" +- {:.1e}", c.bias_standard_error) } else { String::new() };
     let mut parts = vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)];
     parts.extend(c.ssim.map(|v| format!("ssim {v:.4}")));
@@ -111,7 +111,7 @@ fn summary(c: &Comparison) -> String {
     parts.extend(c.flip_hdr.map(|v| format!("flip over exposures {v:.4}")));
     parts.extend(c.bad.outliers.map(|n| format!("outliers {n}")));
     parts.extend(c.reference_standard_error.map(|e| format!("standard error of the reference {e:.1e}")));
-    format!("{}: {}, over {}", c.channels.join(" "), parts.join(", "), c.mask.as_deref().unwrap_or("all pixels"))
+    format!("{}: {}, over {}", c.channels.join(" "), parts.join(", "), c.mask)
 }
 
 /// Channels of the same name and type. The film state (`state.*`) is not compared.
@@ -184,9 +184,14 @@ mod tests {
     fn limits_hold_for_each_channel_and_no_broken_pixel_passes() {
         let of = |channel_rmse: Vec<f64>, nan| {
             let bad = comparison::BadPixels { nan, ..Default::default() };
-            judge(&Comparison { channel_rmse, bad, ..Default::default() }, 0.1).is_ok()
+            judge(&Comparison { channel_rmse, bad, mask_pixels: 1, pixels: 1, ..Default::default() }, Some(0.1)).is_ok()
         };
-        assert!(of(vec![0.1, 0.0], 0) && of(vec![f64::NAN], 0));
-        assert!(!of(vec![0.0, 0.11], 0) && !of(vec![0.0], 1) && !of(vec![f64::NAN], 1));
+        assert!(of(vec![0.1, 0.0], 0));
+        assert!(!of(vec![0.0, 0.11], 0) && !of(vec![0.0], 1) && !of(vec![f64::NAN], 0) && !of(vec![0.0, f64::NAN], 0));
+        // without a limit differences are no failure, but a comparison of nothing is
+        let pixels = |mask_pixels, pixels| judge(&Comparison { mask_pixels, pixels, ..Default::default() }, None);
+        assert!(pixels(2, 1).is_ok());
+        assert!(pixels(0, 0).unwrap_err().to_string().contains("have no pixel of the mask"));
+        assert!(pixels(2, 0).unwrap_err().to_string().contains("no pixel of the mask () is finite"));
     }
 }

@@ -35,7 +35,7 @@ use clap::{FromArgMatches, Parser};
 use crate::error::{Error, Result};
 use crate::settings::parse::usage_message;
 use crate::terminal::console::{Failure, one_line};
-use crate::terminal::{console, panic};
+use crate::terminal::{console, interrupt, panic};
 
 /// Exit codes of the process; part of `--help`.
 pub const EXIT_CODES: &str = "\
@@ -133,6 +133,8 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let arguments = with_json_file(arguments);
     let json = arguments.iter().any(|a| a == "--json");
     panic::install();
+    // before other threads start, which inherit it
+    interrupt::block_file_size_signal();
     let outcome = panic::catch(|| {
         if let Some(text) = help::all(&arguments) {
             return console::print(&text).map_err(Failure::from);

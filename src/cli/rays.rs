@@ -93,7 +93,7 @@ fn read_mesh(source: &str) -> Result<Scene> {
 
 /// Reads RAYS.bin.
 fn read_rays(path: &Path) -> Result<Vec<Ray>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let bytes = files::read(path)?;
     if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
         let message =
             format!("{} bytes: expected a non-zero multiple of {} bytes, the size of a ray", bytes.len(), size_of::<Ray>());

@@ -2,6 +2,7 @@
 
 use super::{ImageSet, differing_metadata, letter};
 use crate::error::Result;
+use crate::measure::comparison::Comparison;
 use crate::report::comparison::{self, NamedImage};
 use crate::report::{Cell, Column, Page, Part, Row, Section, Table, format_number};
 
@@ -47,7 +48,7 @@ fn title(set: &ImageSet, names: &[String]) -> String {
 
 /// The first numbers that one wants to know, in words.
 fn summary(set: &ImageSet) -> String {
-    let sentence = |(k, _, c): (usize, _, &crate::measure::comparison::Comparison)| {
+    let sentence = |(k, _, c): (usize, _, &Comparison)| {
         let flip = c.flip.map_or_else(String::new, |f| format!(", a mean FLIP of {}", format_number(f)));
         let tone = match c.bias {
             b if b > 2.0 * c.bias_standard_error => format!("brighter by {} on average", format_number(b)),
@@ -65,7 +66,10 @@ fn facts(set: &ImageSet) -> Vec<(String, String)> {
     let mut facts = vec![("size".to_owned(), format!("{}x{} pixels", first.width, first.height))];
     if let Some((_, _, c)) = set.judged().next() {
         facts.push(("channels".into(), c.channels.join(" ")));
-        facts.push(("compared".into(), format!("{} pixels ({})", c.pixels, c.mask.as_deref().unwrap_or("all pixels"))));
+        let is_one = set.judged().all(|(_, _, other)| (other.pixels, &other.mask) == (c.pixels, &c.mask));
+        let text = |c: &Comparison| format!("{} pixels ({})", c.pixels, c.mask);
+        let of_each = || set.judged().map(|(k, _, c)| format!("{}: {}", letter(k), text(c))).collect::<Vec<_>>().join(", ");
+        facts.push(("compared".into(), if is_one { text(c) } else { of_each() }));
     }
     for key in ["scene", "device", "tracer", "version"] {
         let value = first.metadata(key).filter(|v| set.entries.iter().all(|e| e.image.metadata(key) == Some(v)));

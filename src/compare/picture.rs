@@ -171,7 +171,7 @@ mod tests {
 
     fn comparison(difference: Vec<f32>, flip: Vec<f32>) -> Comparison {
         let compared = vec![1.0, 1.0, 1.0, 0.0];
-        let maps = Maps { difference, flip, compared };
+        let maps = Maps { difference, flip, mask: compared.clone(), compared };
         Comparison { channels: vec!["Y".into()], maps, ..Comparison::default() }
     }
 

@@ -24,7 +24,10 @@ impl ImageSet {
         let judged: Vec<_> = self.judged().map(|(k, _, c)| (k, c, metrics(c))).collect();
         if let Some((_, c, _)) = judged.first() {
             let [width, height] = [self.entries[0].image.width, self.entries[0].image.height];
-            let mask = c.mask.as_deref().unwrap_or("all pixels");
+            let is_one = judged.iter().all(|(_, other, _)| other.mask == c.mask);
+            let of_each =
+                || judged.iter().map(|(k, c, _)| format!("{}: {}", letter(*k), c.mask)).collect::<Vec<_>>().join(", ");
+            let mask = if is_one { c.mask.clone() } else { of_each() };
             lines.push(format!("channels {} of {width}x{height} pixels, over {mask}", c.channels.join(" ")));
         }
         let widest = |texts: &mut dyn Iterator<Item = &str>| texts.map(|t| t.chars().count()).max().unwrap_or(0) + GAP;

@@ -81,19 +81,17 @@ impl Buffer {
             Memory::Upload => MemoryLocation::CpuToGpu,
             Memory::Readback => MemoryLocation::GpuToCpu,
         };
-        let allocation = device
-            .allocate(&AllocationCreateDesc {
+        let allocation = device.allocate(
+            &AllocationCreateDesc {
                 name,
                 requirements,
                 location,
                 linear: true,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|e| {
-                Error::OutOfMemory(format!(
-                    "no device memory left for {what}: {e}; use a smaller image or scene, or another --device"
-                ))
-            })?;
+            },
+            &what,
+            "use a smaller image or scene, or another --device",
+        )?;
         // SAFETY: fresh memory that fits the buffer's requirements
         unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }.context(&what)?;
         buffer.allocation = Some(allocation);

@@ -15,6 +15,9 @@ use super::pipeline::LivePipelines;
 use super::result::Context;
 use crate::error::{Error, Result};
 
+/// Memory that is taken from the driver at a time, bytes; larger buffers get an allocation of their own, so small blocks waste little.
+const BLOCK: u64 = 16 << 20;
+
 /// Options to open a device with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -105,8 +108,7 @@ impl Device {
             physical_device: info.physical,
             debug_settings: Default::default(),
             buffer_device_address: true,
-            // larger buffers get an allocation of their own, so small blocks waste little
-            allocation_sizes: AllocationSizes::new(16 << 20, 16 << 20),
+            allocation_sizes: AllocationSizes::new(BLOCK, BLOCK),
         })
         .map_err(|e| Error::Vulkan(format!("creating the allocator failed: {e}")))?;
         let data = cache::load(&info);
@@ -135,14 +137,32 @@ impl Device {
         self.allocator.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Allocates memory.
-    pub(super) fn allocate(&self, request: &AllocationCreateDesc) -> Result<Allocation, AllocationError> {
+    /// Allocates memory. `what` it is for, and what helps where none is left, are put into errors.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], and [`Error::Output`] where the driver keeps memory in a file that would exceed the limit for files.
+    pub(super) fn allocate(&self, request: &AllocationCreateDesc, what: &str, remedy: &str) -> Result<Allocation> {
         let mut allocator = self.allocator();
-        let used = || allocator.generate_report().total_allocated_bytes;
-        if super::faults::is_out_of_memory(used, request.requirements.size) {
-            return Err(AllocationError::OutOfMemory);
+        let size = request.requirements.size;
+        let none_left = |e| Error::OutOfMemory(format!("no device memory left for {what}: {e}; {remedy}"));
+        if super::faults::is_out_of_memory(|| allocator.generate_report().total_allocated_bytes, size) {
+            return Err(none_left(AllocationError::OutOfMemory));
         }
-        allocator.allocate(request)
+        let limit = if self.info.is_cpu() { super::environment::file_size_limit() } else { None };
+        if let Some(limit) = limit {
+            let needed = allocator.generate_report().total_capacity_bytes + size.max(BLOCK);
+            // what was freed leaves gaps in the file
+            if needed + needed / 2 > limit {
+                return Err(Error::Output {
+                    path: "device memory".into(),
+                    message: format!(
+                        "this driver keeps it in a file, which for {what} would be larger than files may be here ({limit} bytes): \
+                         raise the limit (`ulimit -f unlimited`)"
+                    ),
+                });
+            }
+        }
+        allocator.allocate(request).map_err(none_left)
     }
 
     /// Names an object for validation messages and debuggers.

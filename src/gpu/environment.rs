@@ -9,8 +9,8 @@
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::sync::Once;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Once, OnceLock};
 
 const WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
 const CACHE: &str = "MESA_SHADER_CACHE_DIR";
@@ -108,6 +108,20 @@ fn is_loaded() -> bool {
     std::fs::read_to_string("/proc/self/maps").is_ok_and(|maps| maps.contains("libvulkan_lvp"))
 }
 
+/// The limit of this process for the size of files (`ulimit -f`), bytes; `None` without one. Lavapipe keeps device memory in a file without a name, and crashes where that cannot grow.
+pub(super) fn file_size_limit() -> Option<u64> {
+    static LIMIT: OnceLock<Option<u64>> = OnceLock::new();
+    *LIMIT.get_or_init(|| file_size_limit_in(&std::fs::read_to_string("/proc/self/limits").ok()?))
+}
+
+/// Reads the limit that is in force from the text of `/proc/self/limits`.
+fn file_size_limit_in(limits: &str) -> Option<u64> {
+    limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max file size"))
+        .and_then(|line| line.split_whitespace().next()?.parse().ok())
+}
+
 #[cfg(target_arch = "x86_64")]
 fn has_512_bits() -> bool {
     is_x86_feature_detected!("avx512f")
@@ -124,6 +138,15 @@ fn has_512_bits() -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_limit_for_files_is_read() {
+        let of = |limit: &str| {
+            let head = "Limit                     Soft Limit           Hard Limit           Units\nMax cpu time              5                    unlimited            seconds\n";
+            file_size_limit_in(&format!("{head}Max file size             {limit}                 unlimited            bytes\n"))
+        };
+        assert_eq!((of("8192"), of("unlimited"), file_size_limit_in("")), (Some(8192), None, None));
+    }
 
     fn of(width: Option<&str>, cache: Option<&str>, preferred: Option<u32>) -> Vec<(&'static str, String)> {
         let all = changes(width.map(Into::into), cache.map(Into::into), preferred, Some("/home/.cache/skylit".into()));

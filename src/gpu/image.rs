@@ -50,19 +50,17 @@ impl Image {
         // SAFETY: the image is of this device
         let requirements = unsafe { device.raw.get_image_memory_requirements(raw) };
         let mib = requirements.size.div_ceil(1 << 20);
-        let allocation = device
-            .allocate(&AllocationCreateDesc {
+        let allocation = device.allocate(
+            &AllocationCreateDesc {
                 name,
                 requirements,
                 location: MemoryLocation::GpuOnly,
                 linear: false,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|e| {
-                Error::OutOfMemory(format!(
-                    "no device memory left for {name} ({mib} MiB): {e}; use a smaller image, or another --device"
-                ))
-            })?;
+            },
+            &format!("{name} ({mib} MiB)"),
+            "use a smaller image, or another --device",
+        )?;
         // SAFETY: fresh memory that fits the image's requirements
         unsafe { device.raw.bind_image_memory(raw, allocation.memory(), allocation.offset()) }.context(name)?;
         image.allocation = Some(allocation);

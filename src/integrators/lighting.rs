@@ -27,7 +27,7 @@ macro_rules! lighting_settings {
             /// Light besides the scene's.
             "Light (--integrator path, direct, lit, whitted)"
             pub struct LightingSettings {
-                /// Environment light: an equirectangular map (.hdr, .exr), a constant radiance R,G,B, or `none` [default: the scene's]
+                /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant radiance R,G,B, or `none` [default: the scene's]
                 ///
                 /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room, and the render prints them as options; `none` leaves it dark.
                 environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
@@ -57,14 +57,14 @@ impl LightingSettings {
     /// # Errors
     /// [`Error::Input`] for a map that cannot be read, [`Error::Usage`] for a negative radiance.
     pub fn apply(&self, scene: &mut Scene) -> Result<()> {
-        if let Some(environment) = self.environment()? {
+        if let Some(environment) = self.environment(&mut |warning| scene.report.warnings.push(warning))? {
             scene.environment = environment;
         }
         self.light.iter().for_each(|l| l.add(scene));
         Ok(())
     }
 
-    fn environment(&self) -> Result<Option<Environment>> {
+    fn environment(&self, warn: &mut dyn FnMut(String)) -> Result<Option<Environment>> {
         let Some(text) = &self.environment else { return Ok(None) };
         if text == "none" {
             return Ok(Some(Environment::Black));
@@ -76,7 +76,7 @@ impl LightingSettings {
             }
             return Ok(Some(Environment::Uniform(colour.as_vec3() * scale)));
         }
-        let mut map = load::load_environment(&PathBuf::from(text))?;
+        let mut map = load::load_environment_with(&PathBuf::from(text), warn)?;
         map.factor = Vec3::splat(scale);
         map.to_map = DMat3::from_rotation_y(-self.environment_turn.unwrap_or(0.0).to_radians());
         Ok(Some(Environment::Map(map)))

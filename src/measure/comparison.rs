@@ -1,12 +1,12 @@
 //! Two images by all metrics: which of their channels are compared, over which pixels, and how they differ.
 
 use super::flip::{PIXELS_PER_DEGREE, flip, flip_hdr};
-use super::mask::MaskOptions;
+use super::mask::{Mask, MaskOptions};
 use super::metrics::ImagePair;
 use super::ssim::ssim;
 use crate::colour::srgb_encode;
 use crate::error::{Error, Result};
-use crate::output::{Image, Samples, png};
+use crate::output::{Image, Samples, exr, png};
 
 /// A pixel is an outlier if its difference is more than this many standard errors of the two images.
 pub const OUTLIER_ERRORS: f64 = 6.0;
@@ -28,9 +28,11 @@ pub struct Comparison {
     /// Channels compared: `R`, `G`, `B`, or `Y` where both images are grey, or those that were asked for. A grey image has three equal channels where the other one has
     /// colours.
     pub channels: Vec<String>,
-    /// The mask in words; `None`: all pixels.
-    pub mask: Option<String>,
-    /// Pixels compared.
+    /// The mask in words. All metrics are over its pixels that are finite in both images.
+    pub mask: String,
+    /// Pixels of the mask.
+    pub mask_pixels: u64,
+    /// Pixels compared: those of the mask that are finite in both images.
     pub pixels: u64,
     /// Pixels compared that differ.
     pub differing: u64,
@@ -87,10 +89,37 @@ pub struct Percentiles {
 pub struct BadPixels {
     /// Pixels where one image is not a number, and the other is one.
     pub nan: u64,
+    /// Pixels where neither image is a number.
+    pub nan_in_both: u64,
     /// Pixels where one image is infinite and the other is finite, or infinite of the other sign.
     pub infinite: u64,
     /// Pixels whose difference is more than [`OUTLIER_ERRORS`] standard errors and [`OUTLIER_LEAST`]; `None` if the reference has no variance.
     pub outliers: Option<u64>,
+}
+
+impl Comparison {
+    /// Whether the metrics say anything: pixels were compared, and none is broken.
+    ///
+    /// # Errors
+    /// [`Error::CheckFailed`] where no pixel was compared, and where a pixel of the mask is not a number, or infinite in one image only.
+    pub fn check(&self) -> Result<()> {
+        let failed = |what: String| Err(Error::CheckFailed(what));
+        let count = |n: u64| if n == 1 { "1 pixel is".to_owned() } else { format!("{n} pixels are") };
+        let BadPixels { nan, nan_in_both, infinite, .. } = self.bad;
+        if nan > 0 {
+            failed(format!("the images differ: {} not a number (NaN) in one of them only", count(nan)))
+        } else if nan_in_both > 0 {
+            failed(format!("the images cannot be compared everywhere: {} not a number (NaN) in both", count(nan_in_both)))
+        } else if infinite > 0 {
+            failed(format!("the images differ: {} infinite in one of them only", count(infinite)))
+        } else if self.mask_pixels == 0 {
+            failed(format!("nothing was compared: the images have no pixel of the mask ({})", self.mask))
+        } else if self.pixels == 0 {
+            failed(format!("nothing was compared: no pixel of the mask ({}) is finite", self.mask))
+        } else {
+            Ok(())
+        }
+    }
 }
 
 /// Differences pixel by pixel, rows from the top.
@@ -102,6 +131,8 @@ pub struct Maps {
     pub flip: Vec<f32>,
     /// 1 for pixels that are compared, else 0.
     pub compared: Vec<f32>,
+    /// 1 for pixels of the mask, else 0.
+    pub mask: Vec<f32>,
 }
 
 impl BadPixels {
@@ -121,7 +152,9 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     let (channels, planes) = select(image, reference, &options.channels)?;
     check_encoding(image, reference, &planes)?;
     let width = image.width as usize;
-    let mask = options.mask.coverage(image, reference)?;
+    let are_colours = channels.iter().all(|c| is_colour(c)) && matches!(channels.len(), 1 | 3);
+    let colours: Vec<&[f32]> = planes.iter().flatten().copied().filter(|_| are_colours).collect();
+    let Mask { name: mask_name, counted: mask } = options.mask.select(image, reference, &colours)?;
     let [a, b] = [0, 1].map(|k| interleaved(&planes.iter().map(|p| p[k]).collect::<Vec<_>>()));
     let n = channels.len();
     let mut bad = BadPixels::default();
@@ -130,7 +163,9 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
             let pairs = || (i * n..(i + 1) * n).map(|k| (a[k], b[k]));
             let finite = pairs().all(|(x, y)| x.is_finite() && y.is_finite());
             if mask[i] > 0.0 && !finite {
-                bad.nan += u64::from(pairs().any(|(x, y)| x.is_nan() != y.is_nan()));
+                let is_nan_in_one = pairs().any(|(x, y)| x.is_nan() != y.is_nan());
+                bad.nan += u64::from(is_nan_in_one);
+                bad.nan_in_both += u64::from(!is_nan_in_one && pairs().any(|(x, y)| x.is_nan() && y.is_nan()));
                 let differ = |(x, y): (f32, f32)| !x.is_nan() && !y.is_nan() && x != y && (x.is_infinite() || y.is_infinite());
                 bad.infinite += u64::from(pairs().all(|(x, y)| x.is_nan() == y.is_nan()) && pairs().any(differ));
             }
@@ -138,17 +173,25 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
         })
         .collect();
     let pair = ImagePair::new(&a, &b, n, Some(&compared))?;
-    let errors = [image, reference].map(|image| squared_errors(image, &channels));
-    bad.outliers = errors[1].is_some().then(|| outliers(&pair, &errors));
-    let are_colours = channels.iter().all(|c| is_colour(c)) && matches!(n, 1 | 3);
-    let flips = if are_colours { Some(flip(&pair, width, PIXELS_PER_DEGREE)?) } else { None };
+
+    // how different it looks: what is not compared is alike in both, so that its differences do not reach into the windows of pixels that are
+    let counts = |k: usize| compared[k / n] > 0.0;
+    let known = |k: usize| if counts(k) || b[k].is_finite() { b[k] } else { 0.0 };
+    let seen: [Vec<f32>; 2] =
+        [(0..a.len()).map(|k| if counts(k) { a[k] } else { known(k) }).collect(), (0..b.len()).map(known).collect()];
+    let seen_pair = ImagePair::new(&seen[0], &seen[1], n, Some(&compared))?;
+    let flips = if are_colours { Some(flip(&seen_pair, width, PIXELS_PER_DEGREE)?) } else { None };
     let exceeds = pair.values().any(|(x, y)| x > 1.0 || y > 1.0);
-    let hdr = if are_colours && exceeds { flip_hdr(&pair, width, PIXELS_PER_DEGREE)? } else { None };
+    let hdr = if are_colours && exceeds { flip_hdr(&seen_pair, width, PIXELS_PER_DEGREE)? } else { None };
     let shown = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| srgb_encode(v.clamp(0.0, 1.0))).collect() };
     let ssim = match are_colours {
-        true => ssim(&ImagePair::new(&shown(&a), &shown(&b), n, Some(&compared))?, width)?,
+        true => ssim(&ImagePair::new(&shown(&seen[0]), &shown(&seen[1]), n, Some(&compared))?, width)?,
         false => None,
     };
+
+    // counts, and what noise explains
+    let errors = [image, reference].map(|image| squared_errors(image, &channels));
+    bad.outliers = errors[1].is_some().then(|| outliers(&pair, &errors));
     let [p50, p95, p99] = pair.percentiles([0.5, 0.95, 0.99]);
     let pixels = compared.iter().filter(|c| **c > 0.0).count() as u64;
     let differing = (0..compared.len()).filter(|&i| compared[i] > 0.0 && a[i * n..][..n] != b[i * n..][..n]).count() as u64;
@@ -158,7 +201,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     };
     let channel_rmse = |p: &[&[f32]; 2]| Ok(ImagePair::new(p[0], p[1], 1, Some(&compared))?.rmse());
     Ok(Comparison {
-        mask: options.mask.description(image, reference),
+        mask: mask_name,
+        mask_pixels: mask.iter().filter(|m| **m > 0.0).count() as u64,
         pixels,
         differing,
         rmse: pair.rmse(),
@@ -181,19 +225,26 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
             difference: a.iter().zip(&b).map(|(a, b)| if a.is_finite() && b.is_finite() { a - b } else { f32::NAN }).collect(),
             flip: hdr.map(|f| f.map).or(flips.map(|f| f.map)).unwrap_or_default(),
             compared: compared.clone(),
+            mask,
         },
         channels,
     })
 }
 
-/// Refuses images of different size.
+/// Refuses images of different size, and those that show different parts of a plane: display windows of EXR files at different places.
 ///
 /// # Errors
 /// [`Error::CheckFailed`].
 pub fn check_size(image: &Image, reference: &Image) -> Result<()> {
     let [a, b] = [image, reference].map(|i| (i.width, i.height));
     if a == b {
-        return Ok(());
+        let [a, b] = [image, reference].map(|i| i.metadata(exr::DISPLAY_ORIGIN).unwrap_or("0,0"));
+        if a == b {
+            return Ok(());
+        }
+        return Err(Error::CheckFailed(format!(
+            "the images show different places: their display windows begin at {a} and {b}"
+        )));
     }
     Err(Error::CheckFailed(format!("the images differ in size: {}x{} and {}x{} pixels", a.0, a.1, b.0, b.1)))
 }

@@ -110,9 +110,9 @@ impl<'a> ImagePair<'a> {
         sum / count as f64
     }
 
-    /// Greatest absolute difference; 0 for no pixels.
+    /// Greatest absolute difference.
     pub fn max_abs_difference(&self) -> f64 {
-        self.guarded(self.values().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+        self.guarded(self.values().map(|(a, b)| (a - b).abs()).reduce(f64::max).unwrap_or(f64::NAN))
     }
 
     /// Mean of (image - reference)^2 / (reference^2 + [`REL_MSE_EPSILON`]).
@@ -143,7 +143,7 @@ impl<'a> ImagePair<'a> {
     pub fn tanimoto(&self) -> f64 {
         let (ab, aa, bb) = self.values().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (a, b)| (ab + a * b, aa + a * a, bb + b * b));
         let x = if aa == 0.0 && bb == 0.0 { 1.0 } else { ab / (aa + bb - ab) };
-        self.guarded(x)
+        if self.count() == 0 { f64::NAN } else { self.guarded(x) }
     }
 }
 

@@ -13,7 +13,7 @@ use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::math::{RoundingMode, Vec2};
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, LevelMode, LineOrder, Matrix4x4, SampleType, Text,
+    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LevelMode, LineOrder, Matrix4x4, SampleType, Text,
 };
 use exr::meta::{MetaData, header::Header};
 use exr::prelude::{
@@ -21,11 +21,18 @@ use exr::prelude::{
     WritableImage, f16,
 };
 
+use super::decode::ENDS_EARLY;
 use super::settings::{ExrCompression, FileSettings};
 use super::{Channel, Image, Samples, check_size};
 use crate::error::{Error, Result};
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 
+/// First bytes of a file.
+pub const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+/// Metadata key of the upper left corner of the display window, `x,y`, of files in which that is not 0,0. Pixels are counted from it.
+pub const DISPLAY_ORIGIN: &str = "displayWindow.origin";
+/// Memory that pixels take at most which are in the display window and not in the file, bytes: a header alone must not decide how much is taken.
+const MAX_PADDING: u64 = 2 << 30;
 /// Prefix of the attributes that hold metadata.
 const PREFIX: &str = "skylit.";
 /// Metadata key of the matrix from world space to camera space (x right, y up, looking along -z): 16 numbers as [`matrix_text`] writes them.
@@ -259,7 +266,10 @@ impl SamplesWriter for RowWriter<'_> {
 }
 
 /// Reads an EXR with all its channels (16-bit floats are converted to 32-bit ones) and its `skylit.` metadata, sorted by key. In a
-/// file with several parts, a part's name becomes the prefix of its channels' names; all parts must have the same size.
+/// file with several parts, a part's name becomes the prefix of its channels' names.
+///
+/// The image is what the display window shows: pixels are where the data window puts them, those outside of the display window (overscan) are left out, and those of it that the
+/// file does not have are 0.
 ///
 /// Of images of skylit the copies of a grey image's channel are left out, and `samples` are floats whatever version wrote them.
 ///
@@ -339,21 +349,111 @@ fn has_block_that_is_too_large(file: File, meta: &MetaData) -> exr::error::Resul
     Ok(false)
 }
 
+/// A rectangle of pixels, which are counted to the right and down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Window {
+    position: Vec2<i32>,
+    size: Vec2<usize>,
+}
+
+impl From<IntegerBounds> for Window {
+    fn from(bounds: IntegerBounds) -> Self {
+        Self { position: bounds.position, size: bounds.size }
+    }
+}
+
+impl std::fmt::Display for Window {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{} pixels at {},{}", self.size.0, self.size.1, self.position.0, self.position.1)
+    }
+}
+
+impl Window {
+    fn pixels(self) -> u128 {
+        self.size.0 as u128 * self.size.1 as u128
+    }
+
+    /// Along an axis (0 or 1): where what both have begins in this window and in the other one, and how many pixels it has.
+    fn overlap(self, other: Self, axis: usize) -> (usize, usize, usize) {
+        let of = |w: Self| match axis {
+            0 => (i64::from(w.position.0), w.size.0 as i64),
+            _ => (i64::from(w.position.1), w.size.1 as i64),
+        };
+        let ((a, a_size), (b, b_size)) = (of(self), of(other));
+        let (first, end) = (a.max(b), (a + a_size).min(b + b_size));
+        let count = (end - first).max(0);
+        if count == 0 { (0, 0, 0) } else { ((first - a) as usize, (first - b) as usize, count as usize) }
+    }
+
+    /// Samples of this window as `display` shows them: 0 for pixels that this window does not have.
+    fn shown_in<T: Copy + Default>(self, display: Self, samples: Vec<T>) -> Vec<T> {
+        if self == display {
+            return samples;
+        }
+        let mut shown = vec![T::default(); display.size.area()];
+        let ((x, to_x, width), (y, to_y, height)) = (self.overlap(display, 0), self.overlap(display, 1));
+        for row in 0..height {
+            let (from, to) = ((y + row) * self.size.0 + x, (to_y + row) * display.size.0 + to_x);
+            shown[to..to + width].copy_from_slice(&samples[from..from + width]);
+        }
+        shown
+    }
+}
+
+/// Refuses sizes that no image of this program has, windows that do not meet, and channels of another resolution.
+///
+/// # Errors
+/// What is wrong, as the end of a sentence.
+fn check_windows(meta: &MetaData) -> std::result::Result<(), String> {
+    let (mut padding, mut is_shown) = (0, false);
+    for header in &meta.headers {
+        let (data, display) = (Window::from(header.data_window()), Window::from(header.shared_attributes.display_window));
+        for (name, window) in [("data", data), ("display", display)] {
+            if window.pixels() == 0 || window.pixels() > u128::from(super::MAX_PIXELS) {
+                return Err(format!("an image of {} x {} pixels ({name} window)", window.size.0, window.size.1));
+            }
+        }
+        let lesser: Vec<_> =
+            header.channels.list.iter().filter(|c| c.sampling != Vec2(1, 1)).map(|c| string(&c.name)).collect();
+        if !lesser.is_empty() {
+            let names = lesser.join(", ");
+            let what = if names.contains("RY") { "colours are luminance and chroma" } else { "they are subsampled" };
+            return Err(format!(
+                "has channels of less resolution than the image ({names}: {what}), which are not read: save it with R, G and B"
+            ));
+        }
+        let [width, height] = [0, 1].map(|axis| data.overlap(display, axis).2);
+        is_shown |= width * height > 0;
+        padding += (display.pixels() as u64 - (width * height) as u64) * header.channels.list.len() as u64 * 4;
+        if padding > MAX_PADDING {
+            return Err(format!(
+                "has a display window of {display}, of which it holds {width}x{height} pixels ({data}): crop its display window"
+            ));
+        }
+    }
+    match meta.headers.first() {
+        Some(header) if !is_shown => Err(format!(
+            "shows nothing: its display window of {} has none of its pixels ({})",
+            Window::from(header.shared_attributes.display_window),
+            Window::from(header.data_window())
+        )),
+        _ => Ok(()),
+    }
+}
+
 fn decode(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
         exr::error::Error::NotSupported(m) => Error::input(path, format!("an EXR of a kind that is not supported: {m}")),
+        // what the decoder says of a file that ends early
+        exr::error::Error::Invalid(m) if m == "reference to missing bytes" => Error::input(path, ENDS_EARLY),
         e => Error::input(path, format!("not a readable EXR: {e}")),
     };
+    files::read_start(path)?;
     let open = || File::open(path).map_err(|e| Error::read(path, &e));
     // the header first: it says how much memory the rest will take
     let meta = MetaData::read_from_unbuffered(open()?, false).map_err(broken)?;
-    for header in &meta.headers {
-        let pixels = header.layer_size.0 as u128 * header.layer_size.1 as u128;
-        if pixels == 0 || pixels > u128::from(super::MAX_PIXELS) {
-            return Err(Error::input(path, format!("an image of {} x {} pixels", header.layer_size.0, header.layer_size.1)));
-        }
-    }
+    check_windows(&meta).map_err(|message| Error::input(path, message))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::read(path, &e))?.len();
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
         return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
@@ -369,23 +469,20 @@ fn decode(path: &Path) -> Result<Image> {
     let reader = if meta.headers.iter().all(is_simple) { reader } else { reader.non_parallel() };
     let file = reader.from_unbuffered(open()?).map_err(broken)?;
 
-    let mut image = Image::default();
+    // all parts have the same display window
+    let display = Window::from(file.attributes.display_window);
+    let mut image = Image { width: display.size.0 as u32, height: display.size.1 as u32, ..Image::default() };
     let parts = file.layer_data.len();
     let is_ours = |a: &LayerAttributes| a.software_name.as_ref().is_some_and(|s| s.as_slice().starts_with(b"skylit "));
     let ours = file.layer_data.iter().all(|layer| is_ours(&layer.attributes));
-    for (i, layer) in file.layer_data.into_iter().enumerate() {
-        let size = (layer.size.0 as u32, layer.size.1 as u32);
-        if i == 0 {
-            (image.width, image.height) = size;
-        } else if size != (image.width, image.height) {
-            return Err(Error::input(path, "its parts differ in size"));
-        }
+    for layer in file.layer_data {
+        let data = Window { position: layer.attributes.layer_position, size: layer.size };
         let prefix = layer.attributes.layer_name.as_ref().filter(|_| parts > 1).map(|n| string(n) + ".").unwrap_or_default();
         for channel in layer.channel_data.list {
             let samples = match channel.sample_data {
-                FlatSamples::F16(s) => Samples::F32(s.into_iter().map(|v| v.to_f32()).collect()),
-                FlatSamples::F32(s) => Samples::F32(s),
-                FlatSamples::U32(s) => Samples::U32(s),
+                FlatSamples::F16(s) => Samples::F32(data.shown_in(display, s.into_iter().map(|v| v.to_f32()).collect())),
+                FlatSamples::F32(s) => Samples::F32(data.shown_in(display, s)),
+                FlatSamples::U32(s) => Samples::U32(data.shown_in(display, s)),
             };
             image.channels.push(Channel { name: prefix.clone() + &string(&channel.name), samples });
         }
@@ -398,6 +495,10 @@ fn decode(path: &Path) -> Result<Image> {
                 image.metadata.push((key.to_owned(), string(value)));
             }
         }
+    }
+    if display.position != Vec2(0, 0) {
+        image.metadata.retain(|(key, _)| key != DISPLAY_ORIGIN);
+        image.metadata.push((DISPLAY_ORIGIN.to_owned(), format!("{},{}", display.position.0, display.position.1)));
     }
     image.metadata.sort();
     image.metadata.dedup();
@@ -425,6 +526,21 @@ fn normalize(image: &mut Image) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pixels_are_where_windows_put_them() {
+        let window = |x, y, width, height| Window { position: Vec2(x, y), size: Vec2(width, height) };
+        let display = window(-2, 5, 3, 2);
+        let shown = |data: Window| data.shown_in(display, (1..=data.size.area() as u32).collect());
+        assert_eq!(shown(display), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(shown(window(-2, 5, 3, 1)), [1, 2, 3, 0, 0, 0]);
+        assert_eq!(shown(window(-1, 6, 1, 1)), [0, 0, 0, 0, 1, 0]);
+        // overscan on all sides, and a corner
+        assert_eq!(shown(window(-3, 4, 5, 4)), [7, 8, 9, 12, 13, 14]);
+        assert_eq!(shown(window(-5, 0, 4, 6)), [24, 0, 0, 0, 0, 0]);
+        assert_eq!(shown(window(1, 5, 3, 2)), [0; 6]);
+        assert_eq!(shown(window(i32::MIN, i32::MAX, 1, 1)), [0; 6]);
+    }
 
     /// A header is a few hundred bytes; what it says must not decide how much memory is taken.
     #[test]

@@ -1,12 +1,14 @@
-//! Image files: EXR with named float channels, pictures (PNG, JPEG, WebP, APNG), and frame numbers in file names.
+//! Image files: EXR with named float channels, pictures (PNG, JPEG, WebP, APNG), Radiance HDR, and frame numbers in file names.
 
 pub mod apng;
+pub mod decode;
 pub mod exr;
 pub mod frames;
 pub mod palette;
 pub mod picture;
 pub mod png;
 pub mod png_text;
+pub mod radiance;
 pub mod settings;
 pub mod tone_map;
 

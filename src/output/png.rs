@@ -4,18 +4,18 @@
 //! Channels `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one. Other channels (alpha, depth, ids)
 //! and the metadata are left out: EXR keeps them.
 
-use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
-use image::ImageReader;
 use rayon::prelude::*;
 
+use super::decode::{MaxSize, decode};
 use super::picture::Picture;
 use super::settings::PngEncoding;
 use super::{Channel, Image, ImageFormat, Samples, check_size};
 use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
+use crate::files;
 
 /// Metadata of images that were not read as linear values: how they were encoded.
 pub const ENCODING: &str = "encoding";
@@ -155,9 +155,9 @@ pub fn depth_to_grey(depth: &[f32]) -> Vec<u8> {
     depth_to_unit(depth).into_par_iter().map(|grey| (grey * 255.0).round() as u8).collect()
 }
 
-/// Does the header of a PNG name no transfer function but 1? The crate image does not tell.
-fn is_linear(file: BufReader<File>) -> bool {
-    let reader = ::png::Decoder::new(file).read_info();
+/// Does the header of a PNG name no transfer function but 1? The crate image does not tell. False for other bytes.
+pub fn is_linear(bytes: &[u8]) -> bool {
+    let reader = ::png::Decoder::new(Cursor::new(bytes)).read_info();
     reader.is_ok_and(|r| r.info().gamma().is_some_and(|gamma| gamma.into_scaled().abs_diff(100_000) < 100))
 }
 
@@ -173,18 +173,10 @@ pub fn read(path: &Path) -> Result<Image> {
         ImageFormat::WebP => ("WebP", image::ImageFormat::WebP),
         ImageFormat::Exr => return Err(Error::Usage(format!("{}: not a picture", path.display()))),
     };
-    let open = || File::open(path).map(BufReader::new).map_err(|e| Error::read(path, &e));
-    let broken = |e: image::ImageError| match e {
-        image::ImageError::IoError(e) => Error::read(path, &e),
-        e => Error::input(path, format!("not a readable {name}: {e}")),
-    };
-    let mut limits = image::Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(1 << 20), Some(1 << 20));
-    limits.max_alloc = Some(super::MAX_PIXELS * 8);
-    let mut reader = ImageReader::with_format(open()?, format);
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(broken)?;
-    let is_linear = format == image::ImageFormat::Png && is_linear(open()?);
+    let bytes = files::read(path)?;
+    let max = MaxSize { side: 1 << 20, pixels_per_byte: None, memory: super::MAX_PIXELS * 8 };
+    let decoded = decode(&bytes, format, max).map_err(|e| Error::input(path, format!("not a readable {name}: {e}")))?;
+    let is_linear = format == image::ImageFormat::Png && is_linear(&bytes);
     let (width, height) = (decoded.width(), decoded.height());
     check_size(width, height).map_err(|e| Error::input(path, e.to_string()))?;
     let bits = 8 * usize::from(decoded.color().bytes_per_pixel()) / usize::from(decoded.color().channel_count());

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::Image;
 use super::png::bytes_of;
 use crate::error::{Error, Result};
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 
 /// Prefix of the keywords.
 const PREFIX: &str = "skylit.";
@@ -44,6 +44,7 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Input`].
 pub fn read_metadata(path: &Path) -> Result<Vec<(String, String)>> {
+    files::read_start(path)?;
     let file = File::open(path).map_err(|e| Error::read(path, &e))?;
     let broken = |e: &dyn std::fmt::Display| Error::input(path, format!("not a readable PNG: {e}"));
     let reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| broken(&e))?;

@@ -12,6 +12,7 @@ use serde_json::Value;
 use super::RenderSettings;
 use super::settings::CameraSettings;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::settings::parse::{parse_vector, usage_message};
 use crate::tracer::DeviceSettings;
 
@@ -140,8 +141,7 @@ impl DefaultsFile {
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, and for a setting that does not exist or has a wrong value.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
-        Self::parse(path, &text)
+        Self::parse(path, &files::read_text(path)?)
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self> {

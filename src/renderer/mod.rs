@@ -95,8 +95,8 @@ struct ReadyTracer {
 #[derive(Default)]
 struct Lighting {
     settings: LightingSettings,
-    /// Lengths of the scene's own lists before: lights, materials, meshes and instances.
-    own: [usize; 4],
+    /// Lengths of the scene's own lists before: lights, materials, meshes, instances and warnings.
+    own: [usize; 5],
     environment: Option<Environment>,
     /// It was chosen because the scene has none.
     is_automatic: bool,
@@ -239,16 +239,17 @@ impl Renderer {
         let s = &mut self.scene;
         let before = std::mem::take(&mut self.lighting);
         if before.settings != LightingSettings::default() {
-            let [lights, materials, meshes, instances] = before.own;
+            let [lights, materials, meshes, instances, warnings] = before.own;
             s.lights.truncate(lights);
             s.materials.truncate(materials);
             s.meshes.truncate(meshes);
             s.instances.truncate(instances);
+            s.report.warnings.truncate(warnings);
             s.environment = before.environment.unwrap_or_default();
         }
         // the traced scene changes
         self.tracer = None;
-        let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len()];
+        let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len(), s.report.warnings.len()];
         let environment = Some(s.environment.clone());
         settings.apply(s)?;
         self.lighting = Lighting { settings: settings.clone(), own, environment, is_automatic: false };

@@ -9,6 +9,7 @@ use super::survey::Survey;
 use super::survey::framing::{self, ChosenCamera, ViewName};
 use crate::denoise::DenoiseChoice;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::camera::{self, Choice};
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::Aov;
@@ -325,12 +326,11 @@ impl RenderSettings {
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, or with a setting that does not exist.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
         #[cfg(feature = "cli")]
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-            return super::defaults::parse_settings(path, &String::from_utf8_lossy(&bytes));
+            return super::defaults::parse_settings(path, &files::read_text(path)?);
         }
-        serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
+        serde_json::from_slice(&files::read(path)?).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
     /// Reads what a person writes in a line: the name of an integrator or of a preset of frames in real time, then options of `skylit render`, with `'` or `"` around

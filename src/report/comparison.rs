@@ -82,7 +82,7 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
         error("Median", "Half of the absolute differences are smaller", c.percentiles.p50),
         error("95th percentile", "95 % of the absolute differences are smaller", c.percentiles.p95),
         error("99th percentile", "99 % of the absolute differences are smaller", c.percentiles.p99),
-        count("NaN pixels", "Pixels where one image is not a number and the other is one", Some(c.bad.nan)),
+        count("NaN pixels", "Pixels where one image is not a number, or both are none", Some(c.bad.nan + c.bad.nan_in_both)),
         count("Infinite pixels", "Pixels where one image is infinite and the other is not", Some(c.bad.infinite)),
         count(
             "Outliers",

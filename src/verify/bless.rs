@@ -148,7 +148,8 @@ fn changes(before: &Golden, after: &Golden) -> Result<String> {
         parts.push("other channels of colour".to_owned());
     } else {
         let c = compare(&after.image, &before.image, &CompareOptions::default())?;
-        match c.max == 0.0 {
+        // where no pixel shows anything, in either image
+        match c.max == 0.0 || c.mask_pixels == 0 {
             true => parts.push("the same colours".to_owned()),
             false => {
                 let flip = c.flip.map(|f| format!(", FLIP {f:.4}")).unwrap_or_default();

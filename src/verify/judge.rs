@@ -110,14 +110,15 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     Ok(Judgement { checks })
 }
 
-/// Pixels that are finite in one of the images alone, or of which samples were left out because they were not.
+/// Pixels that are not a number in one of the images, finite in one of them alone, or of which samples were left out because they were not.
 fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
     let pixels = image.pixel_count();
     let mut broken = vec![false; pixels];
     for channel in &image.channels {
         if let (Samples::F32(values), Some(expected)) = (&channel.samples, golden.image.f32(&channel.name)) {
             // distances to the background are infinite in both
-            (0..pixels).for_each(|p| broken[p] |= values[p].is_finite() != expected[p].is_finite());
+            let is_broken = |a: f32, b: f32| a.is_nan() || b.is_nan() || a.is_finite() != b.is_finite();
+            (0..pixels).for_each(|p| broken[p] |= is_broken(values[p], expected[p]));
         }
     }
     // all pixels of a still get the same samples, but where they stop once they are good enough
@@ -210,7 +211,7 @@ fn looks(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
     let (a, b) = (shown.linear(), expected.linear());
     let flip = flip(&ImagePair::new(&a, &b, shown.channels, None)?, shown.width, PIXELS_PER_DEGREE)?;
     let errors: Vec<f64> = flip.map.iter().map(|e| f64::from(*e)).collect();
-    let found = percentile(&errors, limit.percentile / 100.0).unwrap_or(0.0);
+    let found = percentile(&errors, limit.percentile / 100.0).unwrap_or(f64::NAN);
     let (percentile, max) = (limit.percentile, limit.max);
     let holds = found <= max;
     let text = format!("FLIP {found:.4} at the {percentile}th percentile, at most {max}");

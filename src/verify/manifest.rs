@@ -158,6 +158,9 @@ impl Manifest {
             }
             _ => Error::read(&path, &e),
         })?;
+        if let Some(message) = crate::files::placeholder(text.as_bytes()).filter(|_| !text.is_empty()) {
+            return Err(Error::input(&path, message));
+        }
         let source = Source { path: &path, text: &text };
         let file: File = toml::from_str(&text).map_err(|e| match e.span() {
             Some(span) => source.error(span, e.message()),

@@ -9,6 +9,7 @@ use egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, RawInput,
 
 use super::app::App;
 use crate::error::{Error, Result};
+use crate::files;
 
 /// Longest wait for something that a script does not limit.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -205,8 +206,7 @@ impl Script {
     /// # Errors
     /// [`Error::Input`], naming the line that is no command.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
-        Self::parse(&text, path)
+        Self::parse(&files::read_text(path)?, path)
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self> {

@@ -366,6 +366,34 @@ fn gpu_disks_that_are_full() {
     assert_eq!(names(png.path()), ["a.png", "full.png"]);
 }
 
+/// A limit for files (`ulimit -f`) is as a disk that is full, and says what to raise.
+#[cfg(target_os = "linux")]
+#[test]
+fn gpu_files_that_exceed_their_limit() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let limited = |args: &[&str]| {
+        let program = skylit(&[]).get_program().to_owned();
+        let mut command = Command::new("sh");
+        // in blocks of 512 bytes or, with bash, of 1024
+        command.args(["-c", "ulimit -c 0; ulimit -f 8; exec \"$@\"", "sh"]).arg(program).args(args).current_dir(dir.path());
+        command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null()).output().unwrap()
+    };
+    std::fs::write(dir.path().join("a.glb"), "older").unwrap();
+    let remedy = "raise the limit (`ulimit -f unlimited`)";
+    for name in ["a.glb", "a.bin"] {
+        let out = limited(&["export", "builtin:spheres:100", name]);
+        ends(&out, 4, &format!("{name}: cannot write: it would be larger than files may be here: {remedy}"));
+    }
+    // a driver that runs on the CPU keeps its memory in a file, too
+    let out = limited(&["render", "builtin:cornell-box", "--size", "160x120", "--spp", "1", "--quiet", "-o", "a.exr"]);
+    ends(&out, 4, remedy);
+    assert_eq!(names(dir.path()), ["a.glb"]);
+    assert_eq!(std::fs::read(dir.path().join("a.glb")).unwrap(), b"older");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn gpu_folders_that_are_read_only() {

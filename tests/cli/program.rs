@@ -215,6 +215,38 @@ fn diff_judges_colour() {
     assert!((record["compared"]["bias"].as_f64().unwrap() + 0.01).abs() < 1e-6 && record["covered_pixels_only"] == true);
 }
 
+/// A comparison of nothing fails, with or without a limit, in `diff` and `compare`; the mask is named.
+#[test]
+fn a_comparison_of_nothing_fails() {
+    use skylit::output::{Channel, Image, Samples, save};
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, grey: f32, alpha: f32| {
+        let plane = |name: &str, v: f32| Channel { name: name.into(), samples: Samples::F32(vec![v; 256]) };
+        let channels = vec![plane("A", alpha), plane("B", grey), plane("G", grey), plane("R", 0.5 * grey)];
+        let file = dir.path().join(name);
+        save(&Image { width: 16, height: 16, channels, metadata: Vec::new() }, &file).unwrap();
+        path(&file).to_owned()
+    };
+    let [sky, night, black] = [("sky.exr", 1.0), ("night.exr", 0.25), ("black.exr", 0.0)].map(|(n, v)| write(n, v, 0.0));
+    let nan = write("nan.exr", f32::NAN, 1.0);
+    refuses(&["diff", &sky, &night, "--max-rmse", "0.1", "--quiet"], 1, "RMSE of 7.500e-1");
+    let record = json(&run(&["diff", &sky, &night, "--json"]));
+    assert_eq!(
+        (record["mask"].as_str(), record["compared"]["pixels"].as_u64()),
+        (Some("covered pixels and background that is not black"), Some(256))
+    );
+    let text = String::from_utf8(run(&["diff", &sky, &night]).stdout).unwrap();
+    assert!(text.contains("over covered pixels and background that is not black"), "{text}");
+    for limit in [&["--max-rmse", "10"][..], &[]] {
+        refuses(&[&["diff", &black, &black, "--quiet"], limit].concat(), 1, "have no pixel of the mask (covered pixels)");
+        refuses(&[&["diff", &nan, &nan, "--quiet"], limit].concat(), 1, "256 pixels are not a number (NaN) in both");
+        refuses(&[&["diff", &nan, &sky, "--quiet"], limit].concat(), 1, "not a number (NaN) in one of them only");
+    }
+    assert!(run(&["diff", &black, &black, "--all-pixels"]).status.success());
+    refuses(&["compare", &black, &black, "--quiet"], 1, "A and B: nothing was compared");
+    refuses(&["compare", &sky, &nan, &sky, "--reference", "a", "--quiet"], 1, "B and A: the images differ: 256 pixels");
+}
+
 /// What people are warned of is in the record for programs.
 #[test]
 fn warnings_are_in_the_record() {

@@ -170,7 +170,7 @@ fn files() {
     let key = r#"{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0]}"#;
     let second = |fields: &str| format!(r#"{{"keys": [{key}, {{{fields}}}]}}"#);
     let broken = [
-        ("", "EOF"),
+        ("", "is empty"),
         ("[1, 2]", "not a readable camera path"),
         (r#"{"fps": 30}"#, "missing field `keys`"),
         (r#"{"keys": []}"#, "no keys"),

@@ -29,6 +29,57 @@ fn files_that_are_not_there_or_not_scenes() {
     assert!(matches!(error, Error::Usage(_)), "{error}");
 }
 
+/// What a clone without Git LFS, a download that failed and a web server put in the place of a file.
+#[test]
+fn files_that_are_something_else() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a214614ab2935c943f9e0\nsize 12345\n";
+    let page = "\n<!DOCTYPE html>\n<html><head>";
+    for name in ["a.gltf", "a.glb", "a.obj", "a.brhan"] {
+        let folder = Folder::new();
+        for (bytes, says) in [
+            (pointer.as_bytes(), "is a Git LFS pointer"),
+            (b"", "is empty"),
+            (page.as_bytes(), "is an HTML page"),
+            (b"PK\x03\x04\x14", "is a ZIP archive: unpack it first"),
+            (b"\x1f\x8b\x08\0", "is compressed with gzip: unpack it first"),
+        ] {
+            let text = message(folder.load(name, bytes));
+            assert!(text.contains(name) && text.contains(says), "{text}");
+        }
+    }
+    // files that scenes name
+    let folder = Folder::new();
+    let mut doc = Doc::triangle();
+    doc.json["buffers"] = json!([{ "uri": "a.bin", "byteLength": 36 }]);
+    folder.write("a.bin", pointer);
+    let text = message(folder.load("a.gltf", serde_json::to_vec(&doc.json).unwrap()));
+    assert!(text.contains("a.bin is a Git LFS pointer"), "{text}");
+    folder.write("a.mtl", page);
+    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
+    let text = match folder.load("a.obj", obj) {
+        Ok(scene) => scene.report.warnings.join("; "),
+        Err(error) => error.to_string(),
+    };
+    assert!(text.contains("a.mtl") && text.contains("is an HTML page"), "{text}");
+    folder.write("a.mtl", "newmtl a\nmap_Kd a.png\n");
+    let jpeg = {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([(x * y) as u8, (7 * x) as u8, (y * 3) as u8]));
+        image.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+        bytes.into_inner()
+    };
+    for (bytes, says) in [
+        (pointer.as_bytes(), "is a Git LFS pointer"),
+        (page.as_bytes(), "is an HTML page"),
+        (b"", "is empty"),
+        (&jpeg[..jpeg.len() / 2], "ends early"),
+    ] {
+        folder.write("a.png", bytes);
+        let warnings = folder.load("a.obj", obj).unwrap().report.warnings;
+        assert!(warnings.iter().any(|w| w.contains("a.png") && w.contains(says)), "{warnings:?}");
+    }
+}
+
 #[test]
 fn truncated_glb() {
     let folder = Folder::new();
@@ -98,7 +149,7 @@ fn lenient_where_the_specification_is() {
 fn bad_json_and_versions() {
     let folder = Folder::new();
     assert!(message(folder.load("a.gltf", "{ \"asset\": ")).contains("JSON"));
-    assert!(message(folder.load("a.gltf", "")).contains("JSON"));
+    assert!(message(folder.load("a.gltf", " ")).contains("JSON"));
     assert!(message(folder.load("a.gltf", "[".repeat(100_000))).contains("JSON"));
     let one = r#"{ "asset": { "version": "1.0" }, "meshes": { "a": {} } }"#;
     assert!(message(folder.load("a.gltf", one)).contains("glTF 1.0"));

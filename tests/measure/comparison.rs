@@ -95,6 +95,65 @@ fn outliers_are_what_noise_does_not_explain() {
     assert_eq!(of(&image(vec![("Y", values)]), &exact).unwrap().bad.outliers, Some(3), "less than 8 bits show is none");
 }
 
+/// A comparison of nothing is no agreement.
+#[test]
+fn comparisons_that_say_nothing_fail() {
+    let check = |a: &Image, b: &Image, mask: MaskOptions| {
+        let c = compare(a, b, &CompareOptions { mask, ..Default::default() }).unwrap();
+        match c.check() {
+            Ok(()) => format!("{} pixels: {}", c.pixels, c.mask),
+            Err(Error::CheckFailed(text)) => text,
+            Err(e) => panic!("{e}"),
+        }
+    };
+    let any = MaskOptions::default;
+    let seen = |value: f32, alpha: f32| image(vec![("Y", filled(value)), ("A", filled(alpha))]);
+    // the sky alone is seen: it is compared
+    let skies = "256 pixels: covered pixels and background that is not black";
+    assert_eq!(check(&seen(1.0, 0.0), &seen(0.5, 0.0), any()), skies);
+    assert_eq!(check(&seen(0.0, 0.0), &seen(0.5, 0.0), any()), skies);
+    // an image with alpha and one without
+    assert_eq!(check(&seen(0.0, 0.0), &grey(0.0), any()), "256 pixels: all pixels");
+    let nothing = check(&seen(0.0, 0.0), &seen(0.0, 0.0), any());
+    assert_eq!(nothing, "nothing was compared: the images have no pixel of the mask (covered pixels)");
+    let all = MaskOptions { covered: false, ..any() };
+    assert_eq!(check(&seen(0.0, 0.0), &seen(0.0, 0.0), all), "256 pixels: all pixels");
+    // values that are not finite, also where no surface is
+    let infinite = check(&grey(f32::INFINITY), &grey(f32::INFINITY), any());
+    assert_eq!(infinite, "nothing was compared: no pixel of the mask (all pixels) is finite");
+    let mut values = filled(0.0);
+    values[7] = f32::NAN;
+    let broken = image(vec![("Y", values), ("A", filled(0.0))]);
+    assert!(check(&broken, &seen(0.5, 0.0), any()).contains("1 pixel is not a number (NaN) in one of them only"));
+    assert!(check(&broken, &broken, any()).contains("1 pixel is not a number (NaN) in both"));
+    assert!(check(&grey(f32::INFINITY), &grey(1.0), any()).contains("256 pixels are infinite in one of them only"));
+    let none = of(&grey(f32::NAN), &grey(f32::NAN)).unwrap();
+    for metric in [none.rmse, none.max, none.tanimoto, none.minimum_ratio, none.psnr, none.flip.unwrap()] {
+        assert!(metric.is_nan(), "{none:?}");
+    }
+    // a single pixel
+    let one = |value: f32| Image {
+        width: 1,
+        height: 1,
+        channels: vec![Channel { name: "Y".into(), samples: Samples::F32(vec![value]) }],
+        metadata: Vec::new(),
+    };
+    assert_eq!(check(&one(0.0), &one(1.0), any()), "1 pixels: all pixels");
+}
+
+/// All metrics are over one mask: differences beyond it do not reach into the windows of SSIM and FLIP.
+#[test]
+fn what_is_not_compared_has_no_influence() {
+    let half = MaskOptions { rectangle: Some([0, 0, 8, 16]), ..Default::default() };
+    let options = CompareOptions { mask: half, ..Default::default() };
+    let values = |right: f32| (0..SIZE * SIZE).map(|k| if k % SIZE < 8 { 0.5 } else { right }).collect::<Vec<f32>>();
+    for right in [0.0, 9.0, f32::NAN, f32::INFINITY] {
+        let c = compare(&image(vec![("Y", values(right))]), &grey(0.5), &options).unwrap();
+        assert_eq!((c.rmse, c.flip, c.ssim, c.pixels, c.differing), (0.0, Some(0.0), Some(1.0), 128, 0), "{right}");
+        assert!(c.check().is_ok());
+    }
+}
+
 #[test]
 fn masks_leave_out_pixels() {
     let mut values = filled(0.5);
@@ -102,7 +161,7 @@ fn masks_leave_out_pixels() {
     let (a, b) = (image(vec![("Y", values), ("A", filled(1.0))]), image(vec![("Y", filled(0.5)), ("A", filled(1.0))]));
     let with = |mask: MaskOptions| compare(&a, &b, &CompareOptions { mask, ..Default::default() }).unwrap();
     let all = with(MaskOptions::default());
-    assert_eq!((all.pixels, all.differing, all.mask.as_deref()), (256, 1, Some("covered pixels")));
+    assert_eq!((all.pixels, all.differing, all.mask.as_str()), (256, 1, "covered pixels"));
     let part = with(MaskOptions { rectangle: Some([1, 0, 15, 16]), ..Default::default() });
     assert_eq!((part.pixels, part.differing, part.rmse), (240, 0, 0.0));
 }

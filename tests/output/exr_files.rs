@@ -2,7 +2,12 @@
 
 use std::path::Path;
 
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, f16};
+use exr::math::Vec2;
+use exr::meta::attribute::IntegerBounds;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder, ReadChannels,
+    ReadLayers, WritableImage, f16,
+};
 use skylit::output::exr::{ExrOptions, WORLD_TO_CAMERA, WORLD_TO_NDC, is_half, write, write_with};
 use skylit::output::settings::ExrCompression;
 use skylit::output::{self, Channel, Image, Samples};
@@ -205,4 +210,95 @@ fn earlier_files_are_read() {
         }
     }
     assert!(read > 20, "{read}");
+}
+
+/// A window: left, top, width, height.
+type Window = (i32, i32, usize, usize);
+
+/// Writes an image whose parts have data windows of their own; a pixel's value is its number, which counts from 1.
+fn write_windows(path: &Path, display: Window, parts: &[(&str, Window)], blocks: Blocks) {
+    let part = |(name, (x, y, width, height)): &(&str, Window)| {
+        let samples = (1..=width * height).map(|k| k as f32).collect();
+        let mut attributes = LayerAttributes::named(*name);
+        attributes.layer_position = Vec2(*x, *y);
+        let encoding = Encoding { compression: Compression::ZIP1, blocks, line_order: LineOrder::Increasing };
+        let channels = AnyChannels::sort([AnyChannel::new("Y", FlatSamples::F32(samples))].into_iter().collect());
+        Layer::new((*width, *height), attributes, encoding, channels)
+    };
+    let mut attributes = exr::meta::header::ImageAttributes::with_size((display.2, display.3));
+    attributes.display_window = IntegerBounds::new((display.0, display.1), (display.2, display.3));
+    let layers: exr::prelude::SmallVec<_> = parts.iter().map(part).collect();
+    exr::image::Image::from_layers(attributes, layers).write().to_file(path).unwrap();
+}
+
+#[test]
+fn pixels_are_where_the_windows_put_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.exr");
+    let tiles = Blocks::Tiles(Vec2(2, 2));
+    for blocks in [Blocks::ScanLines, tiles] {
+        let read = |display: Window, data: Window| {
+            write_windows(&path, display, &[("a", data)], blocks);
+            let image = output::load(&path).unwrap();
+            assert_eq!((image.width as usize, image.height as usize), (display.2, display.3));
+            image.f32("Y").unwrap().to_vec()
+        };
+        // the upper half, a crop with display and data windows that begin elsewhere, overscan
+        assert_eq!(read((0, 0, 3, 2), (0, 0, 3, 1)), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0]);
+        assert_eq!(read((0, 0, 3, 2), (1, 1, 1, 1)), [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(read((-3, -2, 3, 2), (-2, -1, 2, 1)), [0.0, 0.0, 0.0, 0.0, 1.0, 2.0]);
+        assert_eq!(read((0, 0, 3, 2), (-1, -1, 5, 4)), [7.0, 8.0, 9.0, 12.0, 13.0, 14.0]);
+    }
+    // parts with data windows of their own
+    write_windows(&path, (0, 0, 2, 2), &[("left", (0, 0, 1, 2)), ("right", (1, 0, 1, 2))], Blocks::ScanLines);
+    let image = output::load(&path).unwrap();
+    assert_eq!(image.f32("left.Y").unwrap(), [1.0, 0.0, 2.0, 0.0]);
+    assert_eq!(image.f32("right.Y").unwrap(), [0.0, 1.0, 0.0, 2.0]);
+    // images of other places are not equal, whatever their pixels
+    let place = |x: i32| {
+        write_windows(&path, (x, 0, 2, 2), &[("a", (x, 0, 2, 2))], Blocks::ScanLines);
+        output::load(&path).unwrap()
+    };
+    let [a, b] = [0, 7].map(place);
+    let error = skylit::measure::comparison::check_size(&a, &b).unwrap_err().to_string();
+    assert!(error.contains("begin at 0,0 and 7,0"), "{error}");
+    assert!(skylit::measure::comparison::check_size(&b, &b).is_ok());
+}
+
+#[test]
+fn windows_that_no_image_has_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.exr");
+    let refuses = |display: Window, data: Window, says: &str| {
+        write_windows(&path, display, &[("a", data)], Blocks::ScanLines);
+        let error = output::load(&path).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    };
+    refuses((0, 0, 4, 4), (4, 0, 2, 2), "shows nothing: its display window of 4x4 pixels at 0,0");
+    refuses((0, 0, 1 << 20, 1 << 20), (0, 0, 2, 2), "1048576 x 1048576 pixels (display window)");
+    // a few hundred bytes do not take gigabytes
+    let many: Vec<_> = (0..5).map(|k| format!("part {k}")).collect();
+    let parts: Vec<(&str, Window)> = many.iter().map(|name| (name.as_str(), (0, 0, 2, 2))).collect();
+    write_windows(&path, (0, 0, 1 << 14, 1 << 14), &parts, Blocks::ScanLines);
+    let error = output::load(&path).unwrap_err().to_string();
+    assert!(error.contains("16384x16384 pixels at 0,0, of which it holds 2x2 pixels"), "{error}");
+}
+
+#[test]
+fn files_that_end_early_say_so() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["a.exr", "a.png", "a.jpg", "a.webp"] {
+        let path = dir.path().join(name);
+        let image = sample();
+        output::save(&Image { channels: vec![f32s("Y", image.f32("albedo.R").unwrap().to_vec())], ..image }, &path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let error = output::load(&path).unwrap_err().to_string();
+        assert!(error.contains("ends early"), "{error}");
+        std::fs::write(&path, b"version https://git-lfs.github.com/spec/v1\noid sha256:4d\nsize 1\n").unwrap();
+        let error = output::load(&path).unwrap_err().to_string();
+        assert!(error.contains("is a Git LFS pointer"), "{error}");
+        std::fs::write(&path, "").unwrap();
+        assert!(output::load(&path).unwrap_err().to_string().contains("is empty"));
+    }
 }

@@ -106,7 +106,7 @@ fn is_plain_name(name: &str) -> bool {
 /// # Errors
 /// [`Error::Input`], naming the file and the line.
 pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+    let text = crate::files::read_text(path)?;
     let at_line = |offset: usize, message: &str| {
         let line = 1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count();
         Error::input(path, format!("line {line}: {message}"))

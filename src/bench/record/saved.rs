@@ -11,6 +11,7 @@ use super::rays::RayBenchmark;
 use super::snapshot::{Comparable, Snapshot};
 use super::{BenchKind, Completeness, HostInfo};
 use crate::error::{Error, Result};
+use crate::files;
 use crate::terminal::console::one_line;
 
 /// A record of one of the benchmarks.
@@ -32,9 +33,9 @@ impl SavedRecord {
     /// # Errors
     /// [`Error::Input`] for a file that is missing or that no benchmark wrote.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+        let bytes = files::read(path)?;
         let broken = |why: String| Error::input(path, format!("is no record of `skylit bench`: {why}"));
-        let mut value: Value = serde_json::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        let mut value: Value = serde_json::from_slice(&bytes).map_err(|e| broken(e.to_string()))?;
         clean(&mut value);
         let kind = kind_of(&value).ok_or_else(|| broken("it does not say which benchmark it is of".into()))?;
         let record = match kind {

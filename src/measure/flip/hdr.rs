@@ -52,13 +52,14 @@ pub fn flip_hdr(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Resul
     Ok(Some(HdrFlip { map, mean, stops, exposures }))
 }
 
-/// The exposures, in stops, that bring the greatest and the median luminance of the reference to [`TARGET`].
+/// The exposures, in stops, that bring the greatest and the median luminance of the reference, over the pixels that count, to [`TARGET`].
 fn exposure_range(pair: &ImagePair) -> Option<[f64; 2]> {
     let mut luminances: Vec<f32> = match pair.channels {
         3 => pair.reference.par_chunks_exact(3).map(|p| luminance(p[0], p[1], p[2])).collect(),
         _ => pair.reference.to_vec(),
     };
-    luminances.retain(|l| l.is_finite());
+    let mut counts = pair.coverage.unwrap_or_default().iter();
+    luminances.retain(|l| counts.next().is_none_or(|c| *c > 0.0) && l.is_finite());
     let greatest = luminances.iter().copied().fold(0.0, f32::max);
     if greatest <= 0.0 {
         return None;

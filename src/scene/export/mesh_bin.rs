@@ -6,6 +6,7 @@ use glam::{DAffine3, Vec3};
 
 use super::{ExportStats, icosphere, write_buffered};
 use crate::error::{Error, Result};
+use crate::files;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// All triangles of `scene` in the world space of its file, as single-precision positions and indices.
@@ -86,7 +87,7 @@ pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<ExportStats> {
 /// [`Error::Input`] for a file that is missing, of the wrong length, or that holds positions which are not finite or
 /// indices out of range; [`Error::Scene`] when it has no triangles.
 pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let bytes = files::read(path)?;
     let words = bytes.as_chunks::<4>().0;
     let (nv, nt) = match words {
         [nv, nt, ..] => (u32::from_le_bytes(*nv), u32::from_le_bytes(*nt)),

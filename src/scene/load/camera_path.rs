@@ -21,6 +21,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::scene::camera_path::{CameraPath, Interpolation, Key};
 
 #[derive(Deserialize)]
@@ -63,7 +64,7 @@ fn default_fov() -> f64 {
 /// # Errors
 /// [`Error::Input`] for a file that is missing or broken, with the number of the key, counted from 1, and what is wrong with it.
 pub fn load_camera_path(path: &Path) -> Result<CameraPath> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let bytes = files::read(path)?;
     let file: PathJson =
         serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a readable camera path: {e}")))?;
     let key = |(k, value): (usize, Value)| {

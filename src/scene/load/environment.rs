@@ -1,4 +1,4 @@
-//! Environments from images: Radiance HDR and OpenEXR in equirectangular projection, or the six faces of a cube.
+//! Environments from images in equirectangular projection (Radiance HDR, OpenEXR, and pictures of 8 or 16 bits), or the six faces of a cube.
 
 mod cube;
 
@@ -6,14 +6,18 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DMat3, Vec3};
-use image::{ImageFormat, ImageReader, Limits};
+use rayon::prelude::*;
 
+use super::picture;
 use crate::error::{Error, Result};
-use crate::output::exr;
+use crate::files;
+use crate::output::{Image, exr, png, radiance};
 use crate::scene::EnvironmentMap;
 
 /// Largest width and height.
 const MAX_SIDE: u32 = 16384;
+/// Radiance that stands in for infinity: the largest value of a 16-bit float, beyond which files have infinity.
+const INFINITE_RADIANCE: f32 = 65504.0;
 
 /// Rows from the top, linear.
 struct Pixels {
@@ -21,15 +25,27 @@ struct Pixels {
     height: u32,
     /// What a map keeps, so that nothing is copied: a map of 16384x8192 has 1.6 GB.
     radiance: Arc<[Vec3]>,
+    /// What was replaced, a sentence.
+    warning: Option<String>,
 }
 
-/// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as `px`, `nx`, `py`, `ny`, `pz`, `nz` (.hdr, .exr, .png, .jpg). Colours
-/// are linear with sRGB primaries (those of .png and .jpg are decoded); values that are negative count as 0.
+/// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as `px`, `nx`, `py`, `ny`, `pz`, `nz`. Images are Radiance HDR, OpenEXR,
+/// PNG, JPEG or WebP, whichever their first bytes show. Colours are linear with sRGB primaries (those of PNG, JPEG and WebP are decoded); values that are negative or not a number
+/// count as 0, infinite ones as 65504.
 ///
 /// # Errors
-/// [`Error::Input`] naming the file when it cannot be read or decoded, or holds values that are not finite.
+/// [`Error::Input`] naming the file when it cannot be read or decoded.
 pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
-    let Pixels { width, height, radiance } = if path.is_dir() { cube::read(path)? } else { read(path)? };
+    load_environment_with(path, &mut |_| ())
+}
+
+/// As [`load_environment`]; `warn` gets a sentence for each image with values that were replaced.
+///
+/// # Errors
+/// Those of [`load_environment`].
+pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Result<EnvironmentMap> {
+    let Pixels { width, height, radiance, warning } = if path.is_dir() { cube::read(path)? } else { read(path)? };
+    warning.into_iter().for_each(warn);
     Ok(EnvironmentMap {
         name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         width,
@@ -40,33 +56,93 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
     })
 }
 
-/// One image.
+/// One image, of the kind that its first bytes show.
 fn read(path: &Path) -> Result<Pixels> {
+    let start = files::read_start(path)?;
     let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    let mut pixels = if is("exr") { read_exr(path)? } else { read_hdr(path)? };
-    if let Some(k) = pixels.radiance.iter().position(|c| !c.is_finite()) {
-        let (x, y) = (k as u32 % pixels.width, k as u32 / pixels.width);
-        return Err(Error::input(path, format!("pixel {x}, {y} is not finite: an environment must be")));
-    }
-    if pixels.radiance.iter().any(|c| c.min_element() < 0.0) {
-        pixels.radiance = pixels.radiance.iter().map(|c| c.max(Vec3::ZERO)).collect();
+    let mut pixels = if start.starts_with(&exr::MAGIC) || is("exr") {
+        read_exr(path)?
+    } else if image::guess_format(&start).is_ok_and(|format| format != image::ImageFormat::Hdr) {
+        read_picture(path)?
+    } else if radiance::is_radiance(&start) || ["hdr", "pic", "rgbe"].into_iter().any(is) {
+        read_hdr(path)?
+    } else {
+        return Err(Error::input(
+            path,
+            "is not an environment: .hdr, .exr, .png, .jpg, .webp and folders of a cube's faces are",
+        ));
+    };
+    if let Some(replaced) = Replaced::count(&pixels.radiance) {
+        pixels.radiance = pixels.radiance.iter().map(|c| Vec3::from_array(c.to_array().map(admissible))).collect();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        pixels.warning = replaced.text().map(|text| format!("{name}: {text}"));
     }
     Ok(pixels)
 }
 
+/// A value that a map may have, in place of one of a file.
+fn admissible(value: f32) -> f32 {
+    // NaN counts as 0
+    if value == f32::INFINITY { INFINITE_RADIANCE } else { value.max(0.0) }
+}
+
+/// Numbers of pixels of a file with values that a map cannot have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Replaced {
+    negative: usize,
+    infinite: usize,
+    not_a_number: usize,
+}
+
+impl Replaced {
+    /// `None` if all values are finite and not negative.
+    fn count(radiance: &[Vec3]) -> Option<Self> {
+        let is_admissible = |c: &Vec3| c.is_finite() && c.min_element() >= 0.0;
+        if radiance.iter().all(is_admissible) {
+            return None;
+        }
+        let number = |is: &dyn Fn(f32) -> bool| radiance.iter().filter(|c| c.to_array().into_iter().any(is)).count();
+        Some(Self {
+            negative: number(&|v| v < 0.0),
+            infinite: number(&|v| v == f32::INFINITY),
+            not_a_number: number(&f32::is_nan),
+        })
+    }
+
+    /// What was replaced by what; nothing is said of negative values, which filters of images leave.
+    fn text(self) -> Option<String> {
+        let text = |n: usize, what: &str, value: f32| match n {
+            1 => format!("1 pixel is {what} and counts as {value}"),
+            _ => format!("{n} pixels are {what} and count as {value}"),
+        };
+        let infinite = text(self.infinite, "infinite", INFINITE_RADIANCE);
+        let not_a_number = text(self.not_a_number, "not a number", 0.0);
+        match (self.infinite, self.not_a_number) {
+            (0, 0) => None,
+            (_, 0) => Some(infinite),
+            (0, _) => Some(not_a_number),
+            _ => Some(format!("{infinite}, {not_a_number}")),
+        }
+    }
+}
+
 fn read_hdr(path: &Path) -> Result<Pixels> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
-    let bad =
-        |e: image::ImageError| Error::input(path, format!("cannot be decoded as Radiance HDR (.exr and .hdr are read): {e}"));
-    let mut reader = ImageReader::with_format(std::io::Cursor::new(bytes), ImageFormat::Hdr);
-    let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
-    limits.max_alloc = Some(4 << 30);
-    reader.limits(limits);
-    let image = reader.decode().map_err(bad)?.into_rgb32f();
-    let (width, height) = image.dimensions();
-    let radiance = image.into_raw().chunks_exact(3).map(Vec3::from_slice).collect();
-    Ok(Pixels { width, height, radiance })
+    let image = radiance::decode(files::read(path)?, MAX_SIDE).map_err(|e| Error::input(path, e))?;
+    let radiance = image.rgb.into_iter().map(Vec3::from_array).collect();
+    Ok(Pixels { width: image.width, height: image.height, radiance, warning: None })
+}
+
+/// A picture of 8 or 16 bits, whose values are decoded; its alpha is ignored.
+fn read_picture(path: &Path) -> Result<Pixels> {
+    let bytes = files::read(path)?;
+    let p = picture::decode(&bytes, &path.to_string_lossy()).map_err(|e| Error::input(path, e))?;
+    let is_linear = png::is_linear(&bytes[..]);
+    let linear = |i| {
+        let [r, g, b, _] = if is_linear { p.texels.get(i) } else { p.texels.decode_srgb(i) };
+        Vec3::new(r, g, b)
+    };
+    let radiance = (0..p.texels.len()).into_par_iter().with_min_len(4096).map(linear).collect();
+    Ok(Pixels { width: p.width, height: p.height, radiance, warning: None })
 }
 
 fn read_exr(path: &Path) -> Result<Pixels> {
@@ -74,10 +150,100 @@ fn read_exr(path: &Path) -> Result<Pixels> {
     if image.width > MAX_SIDE || image.height > MAX_SIDE {
         return Err(Error::input(path, format!("is larger than {MAX_SIDE} pixels")));
     }
-    let plane = |name: &str| {
-        image.f32(name).ok_or_else(|| Error::input(path, format!("has no channel {name} of floats: R, G and B are needed")))
+    let radiance = match colour(&image).map_err(|e| Error::input(path, e))? {
+        Colour::Rgb([r, g, b]) => (0..r.len()).map(|k| Vec3::new(r[k], g[k], b[k])).collect(),
+        Colour::Grey(y) => y.iter().map(|v| Vec3::splat(*v)).collect(),
     };
-    let [r, g, b] = [plane("R")?, plane("G")?, plane("B")?];
-    let radiance = (0..r.len()).map(|k| Vec3::new(r[k], g[k], b[k])).collect();
-    Ok(Pixels { width: image.width, height: image.height, radiance })
+    Ok(Pixels { width: image.width, height: image.height, radiance, warning: None })
+}
+
+/// The samples of an image's colour.
+enum Colour<'a> {
+    Rgb([&'a [f32]; 3]),
+    Grey(&'a [f32]),
+}
+
+/// The colour channels of an image: `R`, `G`, `B` or `Y`, in either case of letters, without a layer or else of the layer `Combined` (`ViewLayer.Combined.R`), or of the only
+/// layer that has colour.
+///
+/// # Errors
+/// What is missing, as the end of a sentence.
+fn colour(image: &Image) -> std::result::Result<Colour<'_>, String> {
+    let layer_of = |name: &str| name.rsplit_once('.').map_or("", |(layer, _)| layer).to_owned();
+    let mut layers: Vec<String> = image.channels.iter().map(|c| layer_of(&c.name)).collect();
+    layers.sort();
+    layers.dedup();
+    let of_layer = |layer: &String| {
+        let channel = |component: &str| {
+            let is = |name: &str| {
+                layer_of(name) == **layer && name.rsplit('.').next().is_some_and(|c| c.eq_ignore_ascii_case(component))
+            };
+            image.channels.iter().find(|c| is(&c.name)).and_then(|c| image.f32(&c.name))
+        };
+        let rgb = channel("R").zip(channel("G")).zip(channel("B")).map(|((r, g), b)| Colour::Rgb([r, g, b]));
+        // the luminance of a colour image is not its colour
+        let is_grey = channel("RY").is_none() && channel("BY").is_none();
+        rgb.or_else(|| channel("Y").filter(|_| is_grey).map(Colour::Grey))
+    };
+    let is_combined = |layer: &&String| layer.rsplit('.').next().is_some_and(|l| l.eq_ignore_ascii_case("Combined"));
+    let own = layers.iter().filter(|l| l.is_empty()).find_map(of_layer);
+    let combined = || layers.iter().filter(is_combined).find_map(of_layer);
+    let only = || {
+        let mut found = layers.iter().filter_map(of_layer);
+        found.next().filter(|_| found.next().is_none())
+    };
+    own.or_else(combined).or_else(only).ok_or_else(|| {
+        let has: Vec<_> = image.channels.iter().map(|c| c.name.as_str()).take(12).collect();
+        let more = if image.channels.len() > has.len() { ", ..." } else { "" };
+        format!("has no colour: channels R, G and B, or Y, of floats are needed, and it has {}{more}", has.join(", "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{Channel, Samples};
+
+    /// An image of a pixel whose channels are numbered from 0.
+    fn image(names: &[&str]) -> Image {
+        let channel = |(k, name): (usize, &&str)| Channel { name: (*name).into(), samples: Samples::F32(vec![k as f32]) };
+        Image { width: 1, height: 1, channels: names.iter().enumerate().map(channel).collect(), metadata: Vec::new() }
+    }
+
+    #[test]
+    fn colours_have_several_names() {
+        let of = |names: &[&str]| match colour(&image(names)) {
+            Ok(Colour::Rgb(planes)) => planes.iter().map(|p| p[0]).collect(),
+            Ok(Colour::Grey(y)) => vec![y[0]],
+            Err(_) => Vec::new(),
+        };
+        assert_eq!(of(&["A", "B", "G", "R"]), [3.0, 2.0, 1.0]);
+        assert_eq!(of(&["r", "g", "b"]), [0.0, 1.0, 2.0]);
+        assert_eq!(of(&["Y"]), [0.0]);
+        assert_eq!(of(&["A", "y", "depth.Z"]), [1.0]);
+        assert_eq!(of(&["Combined.A", "Combined.B", "Combined.G", "Combined.R"]), [3.0, 2.0, 1.0]);
+        let layers =
+            ["View.Combined.B", "View.Combined.G", "View.Combined.R", "View.Diffuse.B", "View.Diffuse.G", "View.Diffuse.R"];
+        assert_eq!(of(&layers), [2.0, 1.0, 0.0]);
+        assert_eq!(of(&layers[3..]), [2.0, 1.0, 0.0]);
+        // without a layer before all others
+        assert_eq!(of(&["B", "Combined.B", "Combined.G", "Combined.R", "G", "R"]), [5.0, 4.0, 0.0]);
+        // two layers that have the same right, luminance without its colour, no colour
+        for names in [&["a.B", "a.G", "a.R", "b.B", "b.G", "b.R"][..], &["BY", "RY", "Y"], &["A", "Z"], &["R", "G"]] {
+            assert!(colour(&image(names)).is_err(), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn values_that_no_map_has_are_counted() {
+        let (nan, infinity) = (f32::NAN, f32::INFINITY);
+        assert_eq!(Replaced::count(&[Vec3::ONE, Vec3::ZERO]), None);
+        let of = |values: &[Vec3]| Replaced::count(values).unwrap().text();
+        assert_eq!(of(&[Vec3::ONE, Vec3::NEG_ONE]), None);
+        assert_eq!(of(&[Vec3::splat(infinity)]).unwrap(), "1 pixel is infinite and counts as 65504");
+        let both = of(&[Vec3::new(infinity, nan, 1.0), Vec3::new(1.0, nan, 0.0), Vec3::splat(-infinity)]).unwrap();
+        assert_eq!(both, "1 pixel is infinite and counts as 65504, 2 pixels are not a number and count as 0");
+        let expected = [infinity, nan, -infinity, -1.0, 1e20].map(admissible);
+        assert_eq!(expected, [65504.0, 0.0, 0.0, 0.0, 1e20]);
+    }
 }

@@ -17,7 +17,7 @@ mod warnings;
 use std::path::Path;
 
 pub use camera_path::load_camera_path;
-pub use environment::load_environment;
+pub use environment::{load_environment, load_environment_with};
 
 use crate::error::{Error, Result};
 use crate::scene::{Scene, builtin};
@@ -111,16 +111,26 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
 /// Reads any format, without [`finish`].
 fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     match extension(path).as_str() {
-        "brhan" => brhan::read(path, options),
+        "brhan" => check_start(path).and_then(|()| brhan::read(path, options)),
         _ => read_model(path, options),
+    }
+}
+
+/// Refuses a file whose first bytes are those of something else that is often found under the name of a scene.
+fn check_start(path: &Path) -> Result<()> {
+    let start = crate::files::read_start(path)?;
+    let archive = [(&b"PK\x03\x04"[..], "a ZIP archive"), (&[0x1f, 0x8b, 0x08], "compressed with gzip")];
+    match archive.iter().find(|(signature, _)| start.starts_with(signature)) {
+        Some((_, what)) => Err(Error::input(path, format!("is {what}: unpack it first"))),
+        None => Ok(()),
     }
 }
 
 /// Reads the formats that hold models and may be named by another file, without [`finish`].
 fn read_model(path: &Path, options: &LoadOptions) -> Result<Scene> {
     match extension(path).as_str() {
-        "gltf" | "glb" => gltf::read(path, options),
-        "obj" => obj::read(path, options),
+        "gltf" | "glb" => check_start(path).and_then(|()| gltf::read(path, options)),
+        "obj" => check_start(path).and_then(|()| obj::read(path, options)),
         "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
         "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
         other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),

@@ -1,9 +1,10 @@
 //! Decoding of image files.
 
-use std::io::Cursor;
+use image::{ColorType, ImageFormat};
 
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
-
+use crate::files::placeholder;
+use crate::output::decode::{self, MaxSize};
+use crate::output::radiance::{self, RadianceImage};
 use crate::scene::TexelData;
 
 /// Largest width and height.
@@ -22,22 +23,22 @@ pub(super) struct DecodedImage {
 /// # Errors
 /// What is wrong, in words.
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<DecodedImage, String> {
+    if let Some(message) = placeholder(bytes) {
+        return Err(message.to_owned());
+    }
+    if radiance::is_radiance(bytes) {
+        let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE)?;
+        let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
+        let texels = rgb.into_iter().flat_map(|[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect::<Vec<f32>>().into();
+        return Ok(DecodedImage { width, height, texels });
+    }
     let format = image::guess_format(bytes)
         .or_else(|_| ImageFormat::from_path(name))
-        .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, TGA and BMP are)".to_owned())?;
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
-    limits.max_alloc = Some(2 << 30);
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|e| format!("cannot be decoded: {e}"))?;
-    let (width, height) = decoder.dimensions();
-    // A one-bit PNG packs at most 8 * 1032 pixels into a byte, every other format fewer: a file that promises more is
-    // broken, and believing it would only cost the memory.
-    if u64::from(width) * u64::from(height) > 10_000 * bytes.len() as u64 || width == 0 || height == 0 {
-        return Err(format!("cannot be decoded: {width}x{height} pixels from {} bytes", bytes.len()));
-    }
-    let pixels = DynamicImage::from_decoder(decoder).map_err(|e| format!("cannot be decoded: {e}"))?;
+        .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, WebP, TGA and BMP are)".to_owned())?;
+    // a one-bit PNG packs at most 8 * 1032 pixels into a byte, every other format fewer
+    let max = MaxSize { side: MAX_SIDE, pixels_per_byte: Some(10_000), memory: 2 << 30 };
+    let pixels = decode::decode(bytes, format, max)?;
+    let (width, height) = (pixels.width(), pixels.height());
     let texels = match pixels.color() {
         ColorType::Rgb32F | ColorType::Rgba32F => {
             let mut rgba = pixels.into_rgba32f().into_raw();

@@ -1,18 +1,17 @@
 //! Cube maps of six images, resampled to the equirectangular projection of environment maps.
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{MAX_SIDE, Pixels};
 use crate::error::{Error, Result};
-use crate::scene::load::picture;
 
 /// File names of the faces, without extension: the axes through their centres.
 const FACES: [&str; 6] = ["px", "nx", "py", "ny", "pz", "nz"];
-const EXTENSIONS: [&str; 5] = ["hdr", "exr", "png", "jpg", "jpeg"];
+const EXTENSIONS: [&str; 6] = ["hdr", "exr", "png", "jpg", "jpeg", "webp"];
 /// Number of samples per texel along each axis.
 const POINTS: u32 = 3;
 
@@ -30,28 +29,17 @@ pub(super) fn read(folder: &Path) -> Result<Pixels> {
     }
     let (width, height) = ((4 * side).min(MAX_SIDE), (2 * side).min(MAX_SIDE / 2));
     let radiance = (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(&faces, [width, height], k)).collect();
-    Ok(Pixels { width, height, radiance })
+    let warnings: Vec<String> = faces.into_iter().filter_map(|f| f.warning).collect();
+    Ok(Pixels { width, height, radiance, warning: (!warnings.is_empty()).then(|| warnings.join("; ")) })
 }
 
 fn face(folder: &Path, name: &str) -> Result<Pixels> {
     let candidates = EXTENSIONS.map(|e| folder.join(name).with_extension(e));
     let Some(path) = candidates.iter().find(|p| p.is_file()) else {
         let all = FACES.join(", ");
-        return Err(Error::input(folder, format!("has no face {name} (.hdr, .exr, .png, .jpg): a cube has {all}")));
+        return Err(Error::input(folder, format!("has no face {name} (.hdr, .exr, .png, .jpg, .webp): a cube has {all}")));
     };
-    if path.extension().is_some_and(|e| e == "hdr" || e == "exr") { super::read(path) } else { picture(path) }
-}
-
-/// Reads an sRGB image.
-fn picture(path: &PathBuf) -> Result<Pixels> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
-    let p = picture::decode(&bytes, &path.to_string_lossy()).map_err(|e| Error::input(path, e))?;
-    let linear = |i| {
-        let [r, g, b, _] = p.texels.decode_srgb(i);
-        Vec3::new(r, g, b)
-    };
-    let radiance = (0..p.texels.len()).into_par_iter().map(linear).collect();
-    Ok(Pixels { width: p.width, height: p.height, radiance })
+    super::read(path)
 }
 
 fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {
@@ -98,8 +86,9 @@ mod tests {
     /// Faces of one colour each: every direction sees the face that it points at.
     #[test]
     fn directions_find_their_faces() {
-        let faces: Vec<Pixels> =
-            (0..6).map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16].into() }).collect();
+        let faces: Vec<Pixels> = (0..6)
+            .map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16].into(), warning: None })
+            .collect();
         let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for (k, axis) in axes.into_iter().enumerate() {
             assert_eq!(look_up(&faces, (axis + DVec3::new(0.1, 0.2, -0.15)).normalize()).x, k as f32);
@@ -116,7 +105,8 @@ mod tests {
     fn faces_are_the_right_way_round() {
         let mut radiance = vec![Vec3::ZERO; 16];
         radiance[0] = Vec3::ONE;
-        let faces: Vec<Pixels> = (0..6).map(|_| Pixels { width: 4, height: 4, radiance: radiance.clone().into() }).collect();
+        let faces: Vec<Pixels> =
+            (0..6).map(|_| Pixels { width: 4, height: 4, radiance: radiance.clone().into(), warning: None }).collect();
         assert_eq!(look_up(&faces, DVec3::new(0.9, 0.9, -1.0)).x, 1.0);
         assert_eq!(look_up(&faces, DVec3::new(-0.9, 0.9, 1.0)).x, 1.0);
         assert_eq!(look_up(&faces, DVec3::new(1.0, 0.9, 0.9)).x, 1.0);

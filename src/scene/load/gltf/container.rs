@@ -216,6 +216,10 @@ fn read_buffer<'a>(
             });
         }
     };
+    if let (Some(uri), Some(message)) = (&buffer.uri, crate::files::placeholder(&bytes)) {
+        let name: String = uri.chars().take(100).collect();
+        return Err(format!("in {name} {message}"));
+    }
     match (bytes.len() as u64, buffer.byte_length.0) {
         (have, want) if have < want => Err(format!("is truncated: {have} bytes of {want}")),
         _ => Ok(bytes),

@@ -57,6 +57,9 @@ impl<'a> MaterialLibrary<'a> {
     /// it have defined stays.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
         let bytes = std::fs::read(mtl).map_err(|e| Error::read(mtl, &e))?;
+        if let Some(message) = crate::files::placeholder(&bytes).filter(|_| !bytes.is_empty()) {
+            return Err(Error::input(mtl, message));
+        }
         let file = mtl.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let warnings = &mut scene.report.warnings;
         let mut parsed = mtl::parse(&text::decode(&bytes), &mut |w| warnings.push(format!("{file}, {w}")));
