@@ -365,7 +365,7 @@ class Gltf(mi.BSDF):
         self.compensation = d.compensation
         if self.compensation and self.volume:
             self.outside, self.inside = (Table(lambda c, r, eta=eta: glass_albedo(c, r, eta)) for eta in (self.ior, 1 / self.ior))
-        elif self.compensation:
+        if self.compensation and (not self.volume or self.clearcoat > 0):
             self.albedo = [Table(lambda c, r, k=k: ggx_albedo(c, r)[k]) for k in (0, 1)]
 
         # a lobe is rough or smooth as a whole
@@ -497,11 +497,27 @@ class Gltf(mi.BSDF):
     def clearcoat_fresnel(self, p: Point, c: Any) -> Any:
         return p.clearcoat * schlick(0.04, 1.0, dr.abs(c))
 
+    def clearcoat_gain(self, p: Point) -> Any:
+        """What compensation multiplies the clearcoat's reflection by."""
+        if not self.compensation or self.clearcoat_smooth:
+            return mi.Float(1)
+        a0, a90 = (table(dr.dot(p.clearcoat_frame.n, p.o), dr.sqrt(p.clearcoat_alpha)) for table in self.albedo)
+        return 1 + 0.04 * (1 - a0 - a90) / (a0 + a90)
+
+    def clearcoat_albedo(self, p: Point) -> Any:
+        c = dr.abs(dr.dot(p.clearcoat_frame.n, p.o))
+        if self.clearcoat_smooth:
+            return schlick(0.04, 1.0, c)
+        a0, a90 = (table(c, dr.sqrt(p.clearcoat_alpha)) for table in self.albedo)
+        return self.clearcoat_gain(p) * (0.04 * a0 + a90)
+
     def through_clearcoat(self, p: Point, i: Any) -> Any:
         """The share that crosses the clearcoat on the way in and out; i in world space."""
         if self.clearcoat == 0:
             return mi.Float(1)
         n = p.clearcoat_frame.n
+        if self.compensation:
+            return 1 - p.clearcoat * self.clearcoat_albedo(p)
         return (1 - self.clearcoat_fresnel(p, dr.dot(n, p.o))) * (1 - self.clearcoat_fresnel(p, dr.dot(n, i)))
 
     def sheen_albedo(self, p: Point, c: Any) -> Any:
@@ -549,7 +565,7 @@ class Gltf(mi.BSDF):
             a = p.clearcoat_alpha
             h = dr.normalize(co + ci)
             c = dr.dot(co, h)
-            clearcoat = self.clearcoat_fresnel(p, c) * ggx_d(h, a, a) * ggx_g2(co, ci, a, a) / (4 * co.z)
+            clearcoat = self.clearcoat_gain(p) * self.clearcoat_fresnel(p, c) * ggx_d(h, a, a) * ggx_g2(co, ci, a, a) / (4 * co.z)
             clearcoat *= shadowing(p.clearcoat_frame.n, p.ng, i_world)
             value += dr.select(ci.z > 0, mi.Color3f(clearcoat), 0)
             pdf += dr.select(ci.z > 0, lobes.clearcoat * ggx_visible_pdf(co, h, a, a) / (4 * dr.maximum(c, 1e-9)), 0)

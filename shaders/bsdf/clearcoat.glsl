@@ -4,9 +4,26 @@
 
 float clearcoat_fresnel(float c) { return mix(0.04, 1.0, schlick_weight(c)); }
 
-// Transmittance of the clearcoat for light from or to a direction: the product of both ways, so that the BSDF is reciprocal.
-float clearcoat_transmits(Clearcoat clearcoat, vec3 w) {
-    return 1.0 - clearcoat.weight * clearcoat_fresnel(abs(dot(clearcoat.normal, w)));
+// Factor of what the clearcoat reflects seen at this cosine: with energy compensation it gives back what its microfacets reflect more than once.
+float clearcoat_gain(Clearcoat clearcoat, float c) {
+    if (!HAS_COMPENSATION || is_smooth(clearcoat.facets)) return 1.0;
+    float e = ggx_albedo(c, sqrt(clearcoat.facets.alpha.x));
+    return 1.0 + 0.04 * ((1.0 - e) / e);
+}
+
+// Share of light from a direction at this cosine that the clearcoat reflects, compensated.
+float clearcoat_albedo(Clearcoat clearcoat, float c) {
+    if (is_smooth(clearcoat.facets)) return clearcoat_fresnel(c);
+    float roughness = sqrt(clearcoat.facets.alpha.x);
+    return clearcoat_gain(clearcoat, c) * ggx_albedo(c, roughness) * mix(0.04, 1.0, ggx_schlick_weight(c, roughness));
+}
+
+// Share of light that crosses the clearcoat on its way from wi to what is below, and on to wo. The product of both ways makes the BSDF reciprocal. With energy compensation,
+// which does not, it is what the clearcoat does not reflect, so that nothing is lost between the layers.
+float clearcoat_transmits(Clearcoat clearcoat, vec3 wo, vec3 wi) {
+    float o = abs(dot(clearcoat.normal, wo));
+    if (HAS_COMPENSATION) return max(1.0 - clearcoat.weight * clearcoat_albedo(clearcoat, clamp(o, MIN_COSINE, 1.0)), 0.0);
+    return (1.0 - clearcoat.weight * clearcoat_fresnel(o)) * (1.0 - clearcoat.weight * clearcoat_fresnel(abs(dot(clearcoat.normal, wi))));
 }
 
 // The clearcoat's normal, which faces the viewer but for rounding; then it is the frame's.
@@ -24,7 +41,7 @@ BsdfValue clearcoat_at(Clearcoat clearcoat, vec3 wo, vec3 wi) {
     o.z = max(o.z, MIN_COSINE);
     if (!(i.z > 0.0)) return NO_VALUE;
     vec3 m = normalize(o + i);
-    float f = clearcoat.weight * clearcoat_fresnel(dot(o, m));
+    float f = clearcoat.weight * clearcoat_gain(clearcoat, min(o.z, 1.0)) * clearcoat_fresnel(dot(o, m));
     float value = f * distribution(clearcoat.facets, m) * masking_shadowing(clearcoat.facets, o, i) / (4.0 * o.z);
     return BsdfValue(vec3(value), reflected_pdf(clearcoat.facets, o, m));
 }

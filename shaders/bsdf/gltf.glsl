@@ -149,7 +149,7 @@ BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
     }
     value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
     if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) {
-        value.f *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
+        value.f *= clearcoat_transmits(b.clearcoat, wo, wi);
         if (up && !is_smooth(b.clearcoat.facets)) {
             BsdfValue clearcoat = clearcoat_at(b.clearcoat, wo, wi);
             value.f += clearcoat.f * shadowing(b.ng, clearcoat_normal(b.clearcoat, wo), wi);
@@ -164,7 +164,7 @@ vec3 gltf_diffuse(Bsdf b, vec3 wo, vec3 wi) {
     float value = interface_fresnel(b, dot(wo, normalize(wo + wi))).diffuse * wi.z / PI;
     if (HAS_SHEEN && b.sheen.kept < 1.0) value *= min(b.sheen.kept, sheen_kept(b.sheen, wi.z));
     value *= shadowing(b.ng, FRAME_NORMAL, wi);
-    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) value *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) value *= clearcoat_transmits(b.clearcoat, wo, wi);
     return vec3(value);
 }
 
@@ -172,7 +172,7 @@ vec3 gltf_diffuse(Bsdf b, vec3 wo, vec3 wi) {
 float layers_transmit(Bsdf b, vec3 wo, vec3 wi) {
     float left = 1.0;
     if (HAS_SHEEN && b.sheen.kept < 1.0) left *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
-    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) left *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) left *= clearcoat_transmits(b.clearcoat, wo, wi);
     return left;
 }
 

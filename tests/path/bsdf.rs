@@ -411,7 +411,13 @@ fn compensated() -> Vec<Case> {
     let case = |name, material| Case { name, material, reciprocal: false, conserves: None, eta: None };
     let body = |name, material| Case { eta: Some(1.5), ..case(name, material) };
     let half_specular = Specular { factor: 0.5, ..Default::default() };
+    let coated =
+        |factor, roughness, below| Material { clearcoat: Clearcoat { factor, roughness, ..Default::default() }, ..below };
     vec![
+        case("smooth coat over plastic", coated(1.0, 0.0, gltf(0.0, 0.6))),
+        case("coat 0.3 over metal", coated(1.0, 0.3, gltf(1.0, 0.5))),
+        case("coat 1 over plastic", coated(1.0, 1.0, gltf(0.0, 0.5))),
+        case("half coat 0.6 over smooth metal", coated(0.5, 0.6, gltf(1.0, 0.0))),
         case("metal 0.1", gltf(1.0, 0.1)),
         case("metal 0.5", gltf(1.0, 0.5)),
         case("metal 1", gltf(1.0, 1.0)),
