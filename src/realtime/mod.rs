@@ -708,7 +708,7 @@ impl Realtime {
             rays_per_pixel: s.rays_per_pixel,
             pattern: s.resolution as u32,
             sequence: s.sequence as u32,
-            reach: s.attenuation().reach() as f32,
+            reach: s.attenuation().visible_reach() as f32,
             falloff_log2: s.attenuation().falloff_log2() as f32,
             most_samples: s.most_samples() as f32,
             depth_tolerance: DEPTH_TOLERANCE,

@@ -530,7 +530,7 @@ impl FramesReport {
         if self.is_radiance() {
             return lines;
         }
-        lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
+        lines.push(match (s.attenuation().is_binary(), s.attenuation().visible_reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {} ends a ray", significant(r, 4)),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
             (false, r) => {

@@ -1,7 +1,9 @@
 //! Attenuation of ambient occlusion with distance, for stills and real-time frames.
 
-/// Occlusion below which hits are not searched for: half a step of an 8-bit image.
-const CUTOFF: f64 = 1.0 / 510.0;
+/// Occlusion below which no hit changes a sample: 1 minus that is 1 in single precision.
+const INSIGNIFICANT: f64 = 1.0 / 33_554_432.0;
+/// Occlusion below which frames do not search for hits: half a step of an 8-bit image.
+const INVISIBLE: f64 = 1.0 / 510.0;
 
 /// Attenuation of occlusion with distance, as shaders/ao/sample.glsl applies it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,9 +15,20 @@ pub struct Attenuation {
 }
 
 impl Attenuation {
-    /// Length of occlusion rays in scene units: the radius, or where the falloff makes occlusion invisible.
+    /// Length of occlusion rays of stills in scene units: the radius, or where the falloff leaves nothing that single precision could add to a sample.
     pub fn reach(self) -> f64 {
-        if self.is_binary() { self.radius } else { self.radius.min(-CUTOFF.ln() / self.falloff.ln()) }
+        self.distance_of(INSIGNIFICANT)
+    }
+
+    /// Length of occlusion rays of frames in scene units: the radius, or where the falloff makes the occlusion of one hit invisible. The sum of what is left out may be visible
+    /// where all occluders are that far.
+    pub fn visible_reach(self) -> f64 {
+        self.distance_of(INVISIBLE)
+    }
+
+    /// Distance at which a hit occludes this much, or the radius if that is less.
+    fn distance_of(self, occlusion: f64) -> f64 {
+        if self.is_binary() { self.radius } else { self.radius.min(-occlusion.ln() / self.falloff.ln()) }
     }
 
     /// Returns true if any hit occludes fully, so that the closest one need not be found.
@@ -40,6 +53,8 @@ mod tests {
         assert_eq!(of(3.0, 2.0).reach(), 3.0);
         assert_eq!(of(f64::INFINITY, 1.0).reach(), f64::INFINITY);
         let faded = of(f64::INFINITY, 2.0);
-        assert!((2f64.powf(-faded.reach()) - CUTOFF).abs() < 1e-12 && !faded.is_binary() && faded.falloff_log2() == 1.0);
+        assert!((faded.reach() - 25.0).abs() < 1e-12 && !faded.is_binary() && faded.falloff_log2() == 1.0);
+        assert_eq!(1.0 - 2f32.powf(-faded.reach() as f32), 1.0);
+        assert!((2f64.powf(-faded.visible_reach()) - INVISIBLE).abs() < 1e-12);
     }
 }

@@ -38,7 +38,7 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         r if r.is_finite() => {
             // four digits, however small the scene is
             let reach: f64 = format!("{r:.3e}").parse().unwrap_or(r);
-            format!("occlusion rays end at distance {reach}: hits beyond do not occlude visibly")
+            format!("occlusion rays end at distance {reach}: hits beyond change no sample")
         }
         _ => "occlusion rays are infinite: neither --ao-radius nor --ao-falloff is given".into(),
     });
