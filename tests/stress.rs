@@ -60,6 +60,12 @@ fn gpu_stress_contact_holds() {
 }
 
 #[test]
+fn gpu_stress_lengths_hold() {
+    // the hits of the compute tracer are its own; tests/ao has images of all tracers
+    holds("lengths", setup().with_tracer(TracerKind::Compute));
+}
+
+#[test]
 fn gpu_stress_display_holds() {
     holds("display", setup());
 }

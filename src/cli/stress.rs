@@ -42,7 +42,7 @@ pub struct StressArgs {
     /// A hundred times as many rays and samples, on all tracers: takes hours on a CPU driver
     #[arg(long)]
     pub full: bool,
-    /// Only these sections, separated by commas: scale, watertight, degenerate, contact, transparency, sampling, long-runs, display, determinism
+    /// Only these sections, separated by commas: scale, watertight, degenerate, contact, lengths, transparency, sampling, long-runs, display, determinism
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub sections: Vec<String>,
     /// Only checks whose name contains this text, as a line of the output has it; may be given several times

@@ -24,6 +24,7 @@ pub mod display;
 pub mod hot_pixel;
 #[cfg(feature = "report")]
 pub mod html;
+pub mod lengths;
 pub mod long_runs;
 pub mod overlaps;
 pub mod sampling;
@@ -247,6 +248,7 @@ pub static SECTIONS: &[Section] = &[
     watertight::SECTION,
     degenerate::SECTION,
     contact::SECTION,
+    lengths::SECTION,
     transparency::SECTION,
     sampling::SECTION,
     long_runs::SECTION,

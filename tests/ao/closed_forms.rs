@@ -15,6 +15,7 @@ use skylit::oracle::closed_form as exact;
 use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::stress::closed_forms::{self, Bias, Case, on_plane, options};
+use skylit::stress::lengths::{Kerb, hit_bound};
 use skylit::stress::scale::{can_bake, floor_beside_sphere, places};
 use skylit::tracer::TracerKind;
 
@@ -46,8 +47,7 @@ fn check(device: &Arc<Device>, case: &Case) {
     }
 }
 
-/// A falloff hit that is not traced for because it is beyond [`AoOptions::reach`] counts nothing: closed forms with falloff get
-/// that as their radius.
+/// Hits beyond [`Attenuation::reach`](skylit::integrators::ao::Attenuation::reach) change no sample, so closed forms may have it as their radius.
 fn reach(falloff: f64) -> f64 {
     AoOptions { falloff, ..Default::default() }.attenuation().reach()
 }
@@ -143,6 +143,34 @@ fn gpu_ao_falloff_and_radius_in_grooves() {
 }
 
 /// A sphere over a plane, pixel by pixel over the whole floor that is seen, near and far, at several scales and positions.
+/// Walls that stand on a floor without common vertices, from ten times to ten million times as long as the distance of the point that sees them.
+#[test]
+fn gpu_ao_long_walls() {
+    let device = device();
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -0.4, 1.1);
+    let (along, lengths) = (DQuat::IDENTITY, [1e1, 1e3, 3e4, 2e5, 1e6]);
+    let places = lengths.map(|l| (l, along)).into_iter().chain([(1e3, turn), (1e4, turn)]);
+    for (k, (length, turn)) in places.enumerate() {
+        let kerb = Kerb::new(length, [0.0, 0.37][k % 2], turn);
+        for kind in tracers(&device) {
+            let tracer = tracer(&device, kind, &kerb.scene);
+            let bias = kerb.bias(&tracer, 256, &mut NoControl).unwrap();
+            println!("length {length:e} {kind}: {bias:?}");
+            assert_eq!(bias.uncovered, 0, "length {length:e} {kind}");
+            assert!(bias.bias.abs() < 1e-3 + 4.5 * bias.standard_error, "length {length:e} {kind}: {bias:?}");
+            let [distance, point] = kerb.errors(&tracer, 1000, &mut NoControl).unwrap();
+            println!("  hits: {distance:.1e}, {point:.1e}");
+            if kind == TracerKind::Compute {
+                assert!(
+                    distance < 1e-3 + 1e-7 * length && point < 1e-3 + 1e-7 * length,
+                    "length {length:e}: {distance} {point}"
+                );
+            }
+        }
+    }
+    assert_validation_clean(&device);
+}
+
 #[test]
 fn gpu_ao_sphere_over_plane() {
     let device = device();
@@ -280,6 +308,28 @@ fn gpu_ao_parallel_planes() {
             assert_eq!(want, 1.0);
         }
         check(&device, &case);
+    }
+    assert_validation_clean(&device);
+}
+
+/// Occlusion of half a per cent at most, of which nearly a half is by hits that occlude by less than a five-hundredth each: a still leaves none out.
+#[test]
+fn gpu_ao_faint_occlusion_counts() {
+    let device = device();
+    let scene = analytic::parallel_planes(40.0, 40.0, 1.0, SceneTransform::default());
+    let occlusion = 1.0 - exact::parallel_disk(1.0, f64::INFINITY, 200.0, f64::INFINITY);
+    let case = Case {
+        what: "parallel planes, falloff 200",
+        scene: &scene,
+        camera: Camera::look_at(DVec3::new(0.2, 0.3, 0.1), DVec3::ZERO, DVec3::X, 0.7),
+        options: options(32, 256, 200.0, f64::INFINITY),
+        surface: &|ray| on_plane(ray, DVec3::ZERO, DVec3::Y),
+        expected: &|_| 1.0 - occlusion,
+    };
+    for kind in tracers(&device) {
+        let bias = case.bias(&tracer(&device, kind, &scene), &case.expectations(), &mut NoControl).unwrap();
+        println!("{kind}: occlusion {occlusion:.3e}, {bias:?}");
+        assert!(bias.bias.abs() < 0.02 * occlusion, "{kind}: {occlusion} {bias:?}");
     }
     assert_validation_clean(&device);
 }
