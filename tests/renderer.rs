@@ -180,6 +180,35 @@ fn gpu_frames_and_stills_take_turns() {
     assert_validation_clean(&device);
 }
 
+/// A camera path with a cut: from there on frames are those of a path that begins there.
+#[test]
+fn gpu_a_cut_of_the_camera_path_begins_anew() {
+    let device = device();
+    let mut renderer =
+        Renderer::new(device.clone(), builtin::by_name("cornell-box").unwrap(), &choice(TracerKind::Compute)).unwrap();
+    let camera = renderer.scene().cameras[0].clone();
+    let (eye, back) = (camera.camera_to_world.translation, camera.camera_to_world.matrix3.z_axis);
+    let key = |frame: u32, eye: glam::DVec3, cut: bool| serde_json::json!({ "frame": frame, "eye": eye.to_array(), "target": (eye - back).to_array(), "fov_y_degrees": 40, "cut": cut });
+    let last = [key(5, eye - 0.3 * back, true), key(9, eye - 0.4 * back, false)];
+    let all = [&[key(0, eye, false), key(4, eye + 0.1 * back, false)][..], &last].concat();
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("path.json");
+    for integrator in ["ao", "path"] {
+        let mut image = |keys: &[serde_json::Value], frames: &str| {
+            std::fs::write(&file, serde_json::json!({ "keys": keys }).to_string()).unwrap();
+            let timeline = settings(serde_json::json!({
+                "integrator": integrator,
+                "image": { "size": [48, 32] },
+                "frames": { "preset": "quality", "frames": frames, "camera_path": file }
+            }));
+            renderer.image(&timeline, &mut NoControl).unwrap()
+        };
+        let [cut, fresh] = [image(&all, "0..7"), image(&last, "5..7")];
+        assert_eq!(cut.channels, fresh.channels, "{integrator}");
+    }
+    assert_validation_clean(&device);
+}
+
 /// Settings are files: what was given comes back, a slip in a name is told, and what has no effect is refused by its name.
 #[test]
 fn settings_are_files() {

@@ -31,6 +31,11 @@ impl CameraMotion {
             Self::Orbit(orbit) => orbit.camera_at(&camera, frame),
         }
     }
+
+    /// Returns true if the camera is cut to another view after frame `before`, and at `frame` or earlier.
+    pub fn has_cut(&self, before: f64, frame: f64) -> bool {
+        matches!(self, Self::Path(path) if path.has_cut(before, frame))
+    }
 }
 
 /// An animation that is played.
@@ -54,6 +59,9 @@ pub struct FrameSequence<'a> {
     frames_per_second: f64,
     /// Seconds since the animation's start at which it is held.
     held: Option<f64>,
+    /// The last frame, if there was one.
+    last: Option<f64>,
+    has_cut: bool,
 }
 
 /// Index of the animation with this name or index.
@@ -105,7 +113,7 @@ impl<'a> FrameSequence<'a> {
                 Some(AnimationPlayback { rig, animation, pose: Pose::default(), posed })
             }
         };
-        Ok(Self { camera, file_camera, motion, played, frames_per_second, held: None })
+        Ok(Self { camera, file_camera, motion, played, frames_per_second, held: None, last: None, has_cut: false })
     }
 
     /// The same with the animation held at a time, in seconds since its start, if one is given; the camera's motion goes on.
@@ -147,7 +155,14 @@ impl<'a> FrameSequence<'a> {
                 p.pose.apply(Arc::make_mut(posed));
             }
         }
+        self.has_cut = self.last.is_some_and(|last| self.motion.has_cut(last, frame));
+        self.last = Some(frame);
         Ok((self.motion.camera_at(camera, frame), stats))
+    }
+
+    /// Returns true if the camera's motion has a cut between the last frame and the one before it: what is known of earlier images says nothing of the last one.
+    pub fn has_cut(&self) -> bool {
+        self.has_cut
     }
 
     /// The scene as it is in the last frame, if the animation moves lights or surfaces that emit light.

@@ -235,6 +235,9 @@ impl Frames<'_> {
         let start = Instant::now();
         let (camera, update) = self.sequence.frame(f64::from(number), &mut self.tracer)?;
         self.last_camera = camera;
+        if self.sequence.has_cut() {
+            self.realtime.rewind();
+        }
         if let Some(posed) = self.sequence.posed_lights() {
             self.realtime.move_lights(&self.tracer, posed)?;
         }

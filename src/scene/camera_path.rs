@@ -29,12 +29,14 @@ pub struct Key {
     pub up: DVec3,
     /// Full vertical field of view in radians, of 0.001 to 179 degrees.
     pub fov_y: f64,
+    /// A cut: the camera stands still at the key before this one until this one's frame, and is here then.
+    pub cut: bool,
 }
 
 /// A key without its frame, as numbers that are interpolated one by one: eye, target, up, field of view.
 type Pose = [f64; 10];
 
-/// A perspective camera that moves from key to key. Each number is interpolated by itself: keys must be near enough to each other
+/// A perspective camera that moves from key to key, but for cuts. Each number is interpolated by itself: keys must be near enough to each other
 /// that eye and target do not pass through one another on the way, nor the view through up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
@@ -61,7 +63,11 @@ impl CameraPath {
         for (k, key) in keys.iter().enumerate() {
             check(key, k.checked_sub(1).map(|before| keys[before].frame)).map_err(|e| format!("key {}: {e}", k + 1))?;
         }
-        let slopes = if interpolation == Interpolation::Smooth { slopes(&keys) } else { Vec::new() };
+        let slopes = match interpolation {
+            // each shot is a path of its own
+            Interpolation::Smooth => keys.chunk_by(|_, next| !next.cut).flat_map(slopes).collect(),
+            Interpolation::Linear => Vec::new(),
+        };
         Ok(Self { fps, interpolation, keys, slopes })
     }
 
@@ -86,6 +92,12 @@ impl CameraPath {
         (self.keys[0].frame, self.keys[self.keys.len() - 1].frame)
     }
 
+    /// Returns true if there is a cut between two frames: after `before`, and at `frame` or earlier.
+    pub fn has_cut(&self, before: f64, frame: f64) -> bool {
+        // what precedes the first key is no other shot
+        self.keys.iter().skip(1).any(|key| key.cut && before < key.frame && key.frame <= frame)
+    }
+
     /// The camera at a frame, which may be fractional; before the first key and after the last it does not move.
     pub fn camera_at(&self, frame: f64) -> Camera {
         let Key { eye, target, up, fov_y, .. } = self.key_at(frame);
@@ -98,7 +110,9 @@ impl CameraPath {
         // NaN counts as the start
         let frame = if frame.is_nan() { first } else { frame.clamp(first, last) };
         let k = self.keys.partition_point(|key| key.frame <= frame).saturating_sub(1);
-        let (a, Some(b)) = (&self.keys[k], self.keys.get(k + 1)) else { return self.keys[k] };
+        let a = &self.keys[k];
+        let cut = a.cut && frame == a.frame;
+        let Some(b) = self.keys.get(k + 1).filter(|b| !b.cut) else { return Key { frame, cut, ..*a } };
         let span = b.frame - a.frame;
         let t = (frame - a.frame) / span;
         let (p, q) = (pose(a), pose(b));
@@ -110,7 +124,7 @@ impl CameraPath {
                 p[i] + (q[i] - p[i]) * (t * t * (3.0 - 2.0 * t)) + t * rest * (rest * m - t * n)
             }
         };
-        key(frame, &std::array::from_fn(between))
+        Key { cut, ..key(frame, &std::array::from_fn(between)) }
     }
 }
 
@@ -120,7 +134,7 @@ fn pose(k: &Key) -> Pose {
 
 fn key(frame: f64, p: &Pose) -> Key {
     let vector = |k: usize| DVec3::new(p[k], p[k + 1], p[k + 2]);
-    Key { frame, eye: vector(0), target: vector(3), up: vector(6), fov_y: p[9] }
+    Key { frame, eye: vector(0), target: vector(3), up: vector(6), fov_y: p[9], cut: false }
 }
 
 /// Checks that a key defines a camera, and that it comes after the previous key.

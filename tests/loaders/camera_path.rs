@@ -14,6 +14,7 @@ fn keys() -> Vec<Key> {
         target: DVec3::from(target),
         up: DVec3::new(0.1, 1.0, 0.0),
         fov_y: f64::to_radians(degrees),
+        cut: false,
     };
     vec![
         at(-3.0, [0.0, 1.5, 4.0], [0.0, 1.0, 0.0], 45.0),
@@ -60,6 +61,29 @@ fn linear_is_exact() {
     let two = |interpolation| CameraPath::new(keys()[..2].to_vec(), interpolation, 30.0).unwrap().key_at(1.0);
     let (a, b) = (numbers(&two(Interpolation::Linear)), numbers(&two(Interpolation::Smooth)));
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14));
+}
+
+/// Until a cut the camera stands where the key before has it, and each shot is a path of its own.
+#[test]
+fn cuts_are_no_motion() {
+    let cut = Key { cut: true, ..keys()[2] };
+    let cut_keys = [&keys()[..2], &[cut], &keys()[3..]].concat();
+    for interpolation in [Interpolation::Linear, Interpolation::Smooth] {
+        let path = CameraPath::new(cut_keys.clone(), interpolation, 30.0).unwrap();
+        for key in &cut_keys {
+            assert_eq!(path.key_at(key.frame), *key);
+        }
+        assert_eq!(path.camera_at(12.499), path.camera_at(10.0));
+        let shots = [&cut_keys[..2], &cut_keys[2..]].map(|keys| CameraPath::new(keys.to_vec(), interpolation, 30.0).unwrap());
+        for (frame, shot) in [(-1.0, 0), (9.0, 0), (12.0, 0), (12.5, 1), (50.0, 1), (60.0, 1)] {
+            assert_eq!(path.camera_at(frame), shots[shot].camera_at(frame), "frame {frame}");
+        }
+        let between = [(12.0, 13.0), (12.0, 12.5), (12.5, 13.0), (11.0, 12.0), (0.0, 60.0)].map(|(a, b)| path.has_cut(a, b));
+        assert_eq!(between, [true, true, false, false, true]);
+        assert!(!self::path(interpolation).has_cut(f64::NEG_INFINITY, f64::INFINITY));
+        // nothing precedes the first key
+        assert!(!shots[1].has_cut(f64::NEG_INFINITY, f64::INFINITY));
+    }
 }
 
 /// Position and speed are continuous at every key.
@@ -161,9 +185,12 @@ fn files() {
     let path = load(text).unwrap();
     assert_eq!((path.fps(), path.interpolation(), path.range()), (24.0, Interpolation::Linear, (0.0, 60.5)));
     let up = DVec3::Z;
-    let first = Key { frame: 0.0, eye: DVec3::new(0.0, 1.6, 4.0), target: DVec3::Y, up, fov_y: 60f64.to_radians() };
+    let first = Key { frame: 0.0, eye: DVec3::new(0.0, 1.6, 4.0), target: DVec3::Y, up, fov_y: 60f64.to_radians(), cut: false };
     assert_eq!(path.keys()[0], first);
     assert_eq!((path.keys()[1].up, path.keys()[1].fov_y), (DVec3::Y, 45f64.to_radians()));
+    let cut = r#"{"keys": [{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0]},
+        {"frame": 1, "eye": [1, 0, 0], "target": [0, 0, 0], "cut": true}]}"#;
+    assert_eq!(load(cut).unwrap().keys().iter().map(|k| k.cut).collect::<Vec<_>>(), [false, true]);
     let defaults = load(r#"{"keys": [{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 179}]}"#).unwrap();
     assert_eq!((defaults.fps(), defaults.interpolation()), (30.0, Interpolation::Smooth));
 
