@@ -2,7 +2,8 @@
 //
 // In motion the resolved image of the previous frame is reprojected with the motion of the nearest surface around a pixel, interpolated by a cubic (Catmull-Rom), which
 // blurs less than a line, and clipped to this frame's values nearby (Karis, "High-Quality Temporal Supersampling", SIGGRAPH 2014 courses; Salvi, "An Excursion in
-// Temporal Supersampling", GDC 2016). At rest frames are averaged, later ones with more weight, because their histories are longer.
+// Temporal Supersampling", GDC 2016). Along edges, whose values are far apart, and in noise the clip lets pass what was there before: where something in front has gone, and where light has changed, there is no
+// history. At rest frames are averaged, later ones with more weight, because their histories are longer.
 //
 // The mean of all samples of ambient visibility since the image came to rest has neither the bias of filters nor that of clamps, but noise, most of which non-local means take away (common/nlmeans.glsl).
 // It takes over as samples become many, and sooner where it differs from the filtered image by more than its noise explains (Lee 1980, as in common/filter.glsl). The filter of radiance has the mean at
@@ -20,6 +21,12 @@ const int BIAS_RADIUS = 2;
 const float FEW_FRAMES = 8.0;
 // Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
 const float FLAT = 1.0 / 512.0;
+// Pixels by which something must have moved on before another surface to have uncovered it: samples that miss what is thinner than a pixel do not say that it has gone.
+const float LEAST_MOTION = 0.75;
+// Maximum number of frames of what moves before a camera that rests: their edges lie where each frame's samples say.
+const float MOVING_FRAMES = 2.0;
+// How many times wider the clamp is where nothing moves in the image.
+const float STILL_CLAMP = 3.0;
 // Samples at rest from which their denoised mean counts at least as much as the filtered image.
 const float TAKE_OVER_SAMPLES = 4.0;
 
@@ -27,6 +34,7 @@ const float TAKE_OVER_SAMPLES = 4.0;
 struct Images {
     ivec2 size;
     uvec2 guide;
+    uvec2 previous_guide;
     // null for visibility, which has no colour
     uvec2 composed;
     uvec2 visibility;
@@ -88,14 +96,16 @@ vec4 resolved_at(Images m, vec2 at, out float frames) {
 struct Neighbourhood {
     vec4 mean;
     vec4 deviation;
+    vec4 middle;    // interpolated in the middle of the pixel
     uint nearest;   // the pixel of the nearest surface
     float depth;    // its distance; INFINITY: there is none
 };
 
-Neighbourhood neighbourhood(Images m, ivec2 pixel) {
-    vec4 sum = vec4(0.0), squares = vec4(0.0);
-    float n = 0.0;
-    Neighbourhood around = Neighbourhood(vec4(0.0), vec4(0.0), image_index(m, pixel), INFINITY);
+// `samples_at`: where samples lie, from the middle of their pixels.
+Neighbourhood neighbourhood(Images m, ivec2 pixel, vec2 samples_at) {
+    vec4 sum = vec4(0.0), squares = vec4(0.0), middle = vec4(0.0);
+    float n = 0.0, weights = 0.0;
+    Neighbourhood around = Neighbourhood(vec4(0.0), vec4(0.0), vec4(0.0), image_index(m, pixel), INFINITY);
     for (int k = 0; k < 9; k++) {
         ivec2 q = pixel + ivec2(k % 3, k / 3) - 1;
         if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, m.size))) continue;
@@ -110,7 +120,11 @@ Neighbourhood neighbourhood(Images m, ivec2 pixel) {
         sum += v;
         squares += v * v;
         n += 1.0;
+        vec2 near = max(1.0 - abs(vec2(q - pixel) + samples_at), 0.0);
+        middle += near.x * near.y * v;
+        weights += near.x * near.y;
     }
+    around.middle = middle / weights;
     around.mean = sum / n;
     around.deviation = sqrt(max(squares / n - around.mean * around.mean, vec4(0.0)));
     return around;
@@ -118,10 +132,11 @@ Neighbourhood neighbourhood(Images m, ivec2 pixel) {
 
 // Where the pixel's centre was in the previous image, in pixels from the centre of the one in the upper left corner: it moved as the nearest surface around it, so that
 // edges move as a whole.
-bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 at) {
+// `before`: where that surface was, world space; of the background nothing.
+bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 at, out vec3 before) {
     uint nearest = around.nearest;
-    vec3 before;
     vec2 now;
+    before = vec3(0.0);
     if (around.depth < INFINITY) {
         before = is_null(f.previous_position) ? surface_position(f, nearest) : load_vec3(f.previous_position, nearest);
         now = sample_place(f, vec2(image_pixel(f, nearest)));
@@ -148,6 +163,102 @@ bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 a
     return all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(f.size) - 0.5));
 }
 
+// Returns true if a point was in one of the boxes of what has moved, and that by more than LEAST_MOTION pixels. `side`: of a pixel's footprint there.
+bool has_moved_on(AntialiasParams p, vec3 position, float side) {
+    MovedRecords moved = MovedRecords(p.moved);
+    for (uint k = 0u; k < p.moved_count; k++) {
+        MovedRecord m = moved.v[k];
+        // surfaces lie on the sides of their boxes
+        vec3 beyond = max(m.lower - position, position - m.upper);
+        bool is_inside = max(beyond.x, max(beyond.y, beyond.z)) < side;
+        if (is_inside && m.share * 0.5 * length(m.upper - m.lower) > LEAST_MOTION * side) return true;
+    }
+    return false;
+}
+
+// Returns true if the previous image showed something around `at` that was in front of what is seen there now, and has moved on. What is not hit now, but is still there, is thinner than a pixel. `before`: where the nearest surface
+// around the pixel was.
+bool is_uncovered(AntialiasParams p, FrameParams f, Images m, ivec2 pixel, Neighbourhood around, vec2 at, vec3 before) {
+    bool is_background = !(around.depth < INFINITY), orthographic = f.previous_orthographic != 0u;
+    float depth = INFINITY;
+    vec2 surface_at = vec2(0.0);
+    EdgeTest edge;
+    if (!is_background) {
+        vec3 c = affine(f.previous_world_to_camera, before);
+        surface_at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z);
+        edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, surface_normal(f, around.nearest), surface_at);
+        depth = -c.z - edge.tolerance;
+    }
+    ivec2 centre = to_int(round(at));
+    vec2 shift = f.previous_offset + 0.5;
+    for (int k = 0; k < 9; k++) {
+        ivec2 q = centre + ivec2(k % 3, k / 3) - 1;
+        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, m.size))) continue;
+        float there = uintBitsToFloat(LOAD_PAIR(m.previous_guide, image_index(m, q)).x);
+        if (!(there < depth) || (!is_background && !in_front(edge, vec2(q) + shift - surface_at, there))) continue;
+        vec3 c = unproject(orthographic, image_plane(f, f.previous_view, vec2(q) + shift), there);
+        c = affine(p.previous_to_camera, c);
+        // where it would be if it had moved as what is behind it
+        vec2 expected = vec2(pixel) + (vec2(q) + shift - at);
+        bool behind = f.orthographic == 0u && !(c.z < 0.0);
+        if (behind || any(greaterThan(abs(image_point(f, f.view, f.orthographic != 0u ? c.xy : c.xy / -c.z) - expected), vec2(LEAST_MOTION)))) return true;
+        if (p.moved_count > 0u && has_moved_on(p, affine(f.camera_to_world, c), footprint(f, f.view, f.orthographic != 0u, -c.z))) return true;
+    }
+    return false;
+}
+
+// Where two planes meet within a pixel, how much of it shows the nearer pixel's surface is known without a history.
+struct Crease {
+    uint other;   // a pixel next to this one, which shows the other plane
+    float share;  // of the pixel that shows it
+};
+
+// The plane that a pixel shows, seen from the middle of `pixel`.
+EdgeTest plane_at(FrameParams f, ivec2 pixel, uint at, uvec2 guide) {
+    return edge_test(f, guide, surface_normal(f, at), sample_place(f, vec2(pixel)));
+}
+
+// The inverse depth of a plane is linear in the image. Its value at a place, and its change by pixels to the right and down.
+vec3 inverse_depth(EdgeTest e, vec2 offset) { return vec3(e.at + offset.x * e.right + offset.y * e.down, e.right, e.down) / e.distance; }
+
+Crease crease_at(FrameParams f, Images m, ivec2 pixel, uint at, uvec2 guide) {
+    Crease crease = Crease(at, 0.0);
+    if (!is_surface(guide) || f.orthographic != 0u) return crease;
+    EdgeTest own = plane_at(f, pixel, at, guide);
+    for (int k = 0; k < 4; k++) {
+        ivec2 step_ = k < 2 ? ivec2(2 * k - 1, 0) : ivec2(0, 2 * k - 5), q = pixel + step_;
+        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, m.size))) continue;
+        uint tap = image_index(m, q);
+        uvec2 there = LOAD_PAIR(m.guide, tap);
+        if (!is_surface(there) || same_surface(own, vec2(step_), there)) continue;
+        EdgeTest other = plane_at(f, q, tap, there);
+        // the samples show one plane each: the difference changes its sign between them
+        vec3 from = inverse_depth(own, vec2(0.0)) - inverse_depth(other, -vec2(step_));
+        vec3 to = inverse_depth(own, vec2(step_)) - inverse_depth(other, vec2(0.0));
+        if (from.x * to.x >= 0.0) continue;
+        vec3 centre = inverse_depth(own, -f.offset) - inverse_depth(other, -f.offset - vec2(step_));
+        // of a strip of a pixel's width across the crease
+        float side = abs(from.y) + abs(from.z), beyond = -centre.x * sign(from.x) / max(side, 1e-30);
+        float share = clamp(0.5 + beyond, 0.0, 1.0);
+        if (share > crease.share) crease = Crease(tap, share);
+    }
+    return crease;
+}
+
+bool camera_rests(FrameParams f) {
+    return f.world_to_camera == f.previous_world_to_camera && f.view == f.previous_view;
+}
+
+// Returns true if the light of a pixel, or of one beside it, has changed from one frame to the next.
+bool has_stepped(AntialiasParams p, Images m, ivec2 pixel) {
+    if (is_null(p.changed)) return false;
+    for (int k = 0; k < 9; k++) {
+        ivec2 q = clamp(pixel + ivec2(k % 3, k / 3) - 1, ivec2(0), m.size - 1);
+        if (load_quad(p.changed, 2u * image_index(m, q) + 1u).w < 0.0) return true;
+    }
+    return false;
+}
+
 // The weight of a frame of all samples at rest, most of which those before it have had, too. `frames`: in the mean, this one included; those in motion are the ones before the image came to rest.
 float long_weight(AntialiasParams p, float frames) {
     if (p.rest_after <= 0.0) return 0.0;
@@ -168,7 +279,7 @@ void main() {
     AntialiasParams p = AntialiasParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     ivec2 pixel = ivec2(image_pixel(f, at));
-    Images m = Images(ivec2(f.size), f.guide, p.composed, p.visibility, p.previous_history);
+    Images m = Images(ivec2(f.size), f.guide, f.previous_guide, p.composed, p.visibility, p.previous_history);
     vec4 now = value_at(m, LOAD_PAIR(m.guide, at), at), resolved = now;
     float frames = 1.0;
     if (p.holds != 0u) {
@@ -179,16 +290,35 @@ void main() {
         frames += 1.0;
         resolved = mix(history, now, max(max(2.0 / (frames + 1.0), p.least_weight), long_weight(p, frames)));
     } else if (p.has_history != 0u && p.most_frames > 1.0) {
-        Neighbourhood around = neighbourhood(m, pixel);
+        Neighbourhood around = neighbourhood(m, pixel, p.samples_at);
         vec4 width = p.clamp_width * around.deviation;
-        vec2 before;
+        vec2 place;
+        vec3 before;
         if (all(lessThanEqual(width, FLAT * around.mean))) {
             frames = p.most_frames;
-        } else if (previous_pixel(f, pixel, around, before)) {
-            float past;
-            vec4 history = max(clipped(resolved_at(m, before, past), around.mean, width), vec4(0.0));
-            frames = min(past + 1.0, p.most_frames);
-            resolved = mix(history, now, 1.0 / frames);
+        } else if (previous_pixel(f, pixel, around, place, before)) {
+            if (p.uncovers != 0u && is_uncovered(p, f, m, pixel, around, place, before)) {
+                resolved = around.middle;
+                Crease crease = crease_at(f, m, pixel, at, LOAD_PAIR(m.guide, at));
+                if (crease.share > 0.0) {
+                    resolved = mix(now, value_at(m, LOAD_PAIR(m.guide, crease.other), crease.other), crease.share);
+                    frames = p.most_frames;
+                }
+            } else {
+                // where nothing moves, no place is interpolated, and what is uncovered has no history: more frames are as sharp, and smoother
+                bool is_still = all(lessThan(abs(place - vec2(pixel)), vec2(1e-3)));
+                float past, most = is_still ? p.most_still_frames : camera_rests(f) ? min(p.most_frames, MOVING_FRAMES) : p.most_frames;
+                if (is_still) width *= STILL_CLAMP;
+                // under a camera that rests all frames' samples around a place say more of it than one
+                vec4 latest = camera_rests(f) && p.uncovers != 0u ? around.middle : now;
+                vec4 history = max(clipped(resolved_at(m, place, past), around.mean, width), vec4(0.0));
+                frames = min(past + 1.0, most);
+                resolved = mix(history, latest, 1.0 / frames);
+                if (has_stepped(p, m, pixel)) {
+                    frames = 1.0;
+                    resolved = around.middle;
+                }
+            }
         }
     }
     store_resolved(p, at, resolved, frames);

@@ -24,6 +24,9 @@ RadianceEstimate estimate_of(RadianceEstimate own, vec3 mean, float n, vec3 vari
 
 int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radius, to_int(ceil((1.0 - own.narrowed) * float(p.radius)))); }
 
+// A shadow that has come is as thin as it is: it is averaged within itself, and darkens nothing around it.
+float filter_class(RadianceEstimate e) { return e.narrowed == LIGHT_DARKENED ? 1.0 : 0.0; }
+
 // The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
 // pixels that may be averaged.
 bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) {

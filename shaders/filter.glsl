@@ -14,6 +14,8 @@ const float LONELY = 6.0;
 
 Estimate load_estimate(uvec2 estimates, uint at) { return unpack_estimate(LOAD_PAIR(estimates, at)); }
 
+float filter_class(Estimate e) { return 0.0; }
+
 bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) { return same_surface(edge, offset, guide, normal); }
 
 vec3 edge_normal(vec3 normal, uvec2 guide) { return normal; }

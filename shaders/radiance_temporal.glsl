@@ -31,6 +31,14 @@ const float CHANGE_TOLERANCE = 4.0;
 // Pixels with samples below which nothing is known of that, and frames for which a history counts there.
 const float FEW_PIXELS = 4.0;
 const float UNKNOWN_FRAMES = 0.5;
+// Standard deviations by which a pixel's samples must differ from its history to be a step of light, and the same as a share of the brighter of both.
+const float STEP_DEVIATIONS = 3.0;
+const float LEAST_STEP = 0.15;
+// Samples as which the noise nearby counts beside what a history says of its own.
+const float NEARBY_SAMPLES = 4.0;
+// Pixels next to one that must have stepped likewise: of those that have become darker, and brighter. Light that is rare reaches single pixels, and the edges of shadows are lines.
+const int LEAST_DARKER = 1;
+const int LEAST_BRIGHTER = 2;
 // Pixels between the taps by which histories are compared with samples at rest.
 const int AGREEMENT_STRIDE = 2;
 // Share of older samples from which they are compared.
@@ -95,11 +103,16 @@ vec3 clamped(RadianceTemporalParams p, FrameParams f, uvec2 image, uvec2 pixel, 
     return clamp(history, mean - width, mean + width);
 }
 
-// For how many frames a history counts after lights or materials have changed: CHANGE_TOLERANCE e / b^2. The bias b is the mean of the differences between this frame's samples and histories in the pixels nearby, without what
-// the noise e of that mean explains. The noise is that of the differences, or what the variance of earlier samples leads to expect where that is more: where light is rare, all samples of a frame may miss it. `motion`: pixels from a pixel to where its history is.
-float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 motion, EdgeTest edge) {
-    vec3 sum = vec3(0.0), squares = vec3(0.0), variance = vec3(0.0);
-    float n = 0.0;
+// This frame's samples around a pixel against their histories.
+struct Differences {
+    vec3 sum, squares, variance;  // over pixels: of the differences, and the variance that the earlier samples lead to expect of this frame's
+    float count;
+    float noise, deviation, freedom;  // of earlier samples: sums of squared deviations and of standard deviations, and how many samples they are worth
+};
+
+// `motion`: pixels from a pixel to where its history is.
+Differences differences(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 motion, EdgeTest edge) {
+    Differences around = Differences(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, 0.0);
     ivec2 last = ivec2(f.size) - 1, lower = max(ivec2(pixel) - CLAMP_RADIUS, max(-motion, ivec2(0))), upper = min(ivec2(pixel) + CLAMP_RADIUS, min(last - motion, last));
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
@@ -107,18 +120,71 @@ float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec
             RadianceEstimate now = load_radiance(image, tap), then = load_radiance(previous, image_index(f, uvec2(ivec2(x, y) + motion)));
             if (now.samples == 0.0 || then.samples == 0.0 || !same_surface(edge, vec2(ivec2(x, y) - ivec2(pixel)), LOAD_PAIR(f.guide, tap))) continue;
             vec3 difference = now.mean - then.mean;
-            sum += difference;
-            squares += difference * difference;
-            variance += then.variance / now.samples;
-            n += 1.0;
+            around.sum += difference;
+            around.squares += difference * difference;
+            around.variance += then.variance / now.samples;
+            around.count += 1.0;
+            float freedom = max(then.samples - 1.0, 0.0);
+            float noise = brightness(then.variance) * then.samples;
+            around.noise += noise;
+            around.deviation += sqrt(noise * freedom);
+            around.freedom += freedom;
         }
     }
+    return around;
+}
+
+// Whether a pixel's samples differ from its history by more than noise: 1 where they are brighter, -1 where they are darker, else 0. `nearby`: variance of the samples of pixels around, against which darker and brighter ones are held.
+float step_at(FrameParams f, uvec2 image, uvec2 previous, ivec2 pixel, ivec2 motion, vec2 nearby) {
+    ivec2 before = pixel + motion;
+    if (any(lessThan(min(pixel, before), ivec2(0))) || any(greaterThanEqual(max(pixel, before), ivec2(f.size)))) return 0.0;
+    RadianceEstimate now = load_radiance(image, image_index(f, uvec2(pixel))), then = load_radiance(previous, image_index(f, uvec2(before)));
+    if (now.samples == 0.0 || then.samples == 0.0) return 0.0;
+    float a = brightness(now.mean), b = brightness(then.mean), least = LEAST_STEP * max(a, b);
+    // of brightness, whose channels may all vary alike
+    float variance = 3.0 * (NEARBY_SAMPLES * (a < b ? nearby.x : nearby.y) + brightness(then.variance) * then.samples) / (NEARBY_SAMPLES + max(then.samples - 1.0, 0.0));
+    float expected = STEP_DEVIATIONS * STEP_DEVIATIONS * variance * (1.0 / now.samples + 1.0 / then.samples);
+    return (a - b) * (a - b) > expected + least * least ? sign(a - b) : 0.0;
+}
+
+// Whether light has changed from one frame to the next at a pixel and at others beside it: 1 to more, -1 to less, else 0. The mean over more pixels does not tell where a thin shadow has come, and from where it has gone.
+float light_step(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 motion, Differences around) {
+    if (!(around.freedom > 0.0)) return 0.0;
+    // what has become brighter may be light that is rare, and is held against all of the noise; few pixels in which a shadow has come or gone have most of it
+    float deviation = around.deviation / around.freedom;
+    vec2 nearby = vec2(deviation * deviation, around.noise / around.freedom);
+    float own = step_at(f, image, previous, ivec2(pixel), motion, nearby);
+    if (own == 0.0) return 0.0;
+    int alike = 0;
+    for (int k = 0; k < 9; k++) {
+        if (k != 4 && step_at(f, image, previous, ivec2(pixel) + ivec2(k % 3, k / 3) - 1, motion, nearby) == own) alike++;
+    }
+    return alike >= (own < 0.0 ? LEAST_DARKER : LEAST_BRIGHTER) ? own : 0.0;
+}
+
+// No history where light has changed in one step.
+RadianceEstimate after_step(RadianceEstimate history, float step_) {
+    return step_ == 0.0 ? history : RadianceEstimate(vec3(0.0), 0.0, vec3(0.0), step_ < 0.0 ? LIGHT_DARKENED : LIGHT_BRIGHTENED);
+}
+
+// For how many frames a history counts after lights or materials have changed: CHANGE_TOLERANCE e / b^2. The bias b is the mean of the differences between this frame's samples and histories in the pixels nearby, without what
+// the noise e of that mean explains. The noise is that of the differences, or what the variance of earlier samples leads to expect where that is more: where light is rare, all samples of a frame may miss it.
+float frames_worth(Differences around) {
+    float n = around.count;
     if (n < FEW_PIXELS) return UNKNOWN_FRAMES;
-    vec3 mean = sum / n;
-    float noise = dot(max(squares / n - mean * mean, variance / n), vec3(1.0 / n));
+    vec3 mean = around.sum / n;
+    float noise = dot(max(around.squares / n - mean * mean, around.variance / n), vec3(1.0 / n));
     float squared_bias = dot(mean, mean) - noise;
     // also of equal values without noise, and of squares beyond what floats hold
     return squared_bias > 0.0 ? CHANGE_TOLERANCE * noise / squared_bias : INFINITY;
+}
+
+// A history after lights or materials have changed.
+RadianceEstimate after_change(FrameParams f, RadianceEstimate history, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 motion, EdgeTest edge) {
+    if (!(history.samples > 0.0)) return history;
+    Differences around = differences(f, image, previous, pixel, motion, edge);
+    history.samples = min(history.samples, float(f.rays_per_pixel) * frames_worth(around));
+    return after_step(history, light_step(f, image, previous, pixel, motion, around));
 }
 
 // The share of a history that is older than the samples at rest.
@@ -213,11 +279,15 @@ void main() {
         }
         EdgeTest edge = with_normal(edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel))), guide);
         if (p.most_past < INFINITY) {
-            float samples = float(f.rays_per_pixel);
-            if (diffuse.samples > 0.0) diffuse.samples = min(diffuse.samples, samples * frames_worth(f, p.diffuse, p.previous_diffuse, pixel, diffuse_motion, edge));
-            if (specular.samples > 0.0) specular.samples = min(specular.samples, samples * frames_worth(f, p.specular, p.previous_specular, pixel, specular_motion, edge));
+            diffuse = after_change(f, diffuse, p.diffuse, p.previous_diffuse, pixel, diffuse_motion, edge);
+            specular = after_change(f, specular, p.specular, p.previous_specular, pixel, specular_motion, edge);
         }
         float change = p.moved_count > 0u ? p.moved_weight * possible_change(p.moved, p.moved_count, f, position, normal) : 0.0;
+        // most pixels have not stepped, whatever the noise nearby
+        if (change > 0.0 && diffuse.samples > 0.0 && !(p.most_past < INFINITY) && step_at(f, p.diffuse, p.previous_diffuse, ivec2(pixel), diffuse_motion, vec2(0.0)) != 0.0) {
+            Differences around = differences(f, p.diffuse, p.previous_diffuse, pixel, diffuse_motion, edge);
+            diffuse = after_step(diffuse, light_step(f, p.diffuse, p.previous_diffuse, pixel, diffuse_motion, around));
+        }
         if (change > 0.0 && diffuse.samples > 0.0) {
             // as ambient visibility: relative to the signal
             float m = max(brightness(diffuse.mean), 1e-20);
@@ -236,6 +306,7 @@ void main() {
         }
     }
     bool rests = f.has_history != 0u && f.still != 0u && !is_null(p.rest);
+    float light = min(diffuse.narrowed, 0.0);
     diffuse = added(f, diffuse, load_radiance(p.diffuse, at), p.most_past, rests);
     specular = added(f, specular, load_radiance(p.specular, at), p.most_past, rests);
     if (rests) {
@@ -248,7 +319,7 @@ void main() {
             specular = rested(specular, specular_at_rest(rest, parts), rest.samples, share.y);
         }
     }
-    diffuse.narrowed = 0.0;
+    diffuse.narrowed = light;
     specular.narrowed = roughness <= SHARP_ROUGHNESS ? 1.0 : 1.0 - clamp(roughness / WIDE_ROUGHNESS, 0.0, 1.0);
     store_radiance(p.diffuse_history, at, diffuse);
     store_radiance(p.specular_history, at, specular);

@@ -17,6 +17,7 @@
 //   vec3 edge_normal(normal, guide)                the normal that neighbours' normals are compared with: the surface's, or what the guide has
 //   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
 //                                                  the variance of its pixels and the samples per pixel
+//   float filter_class(estimate)                   pixels of different classes are not averaged
 //   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
 //   VALUE noise_variance(own, variance, noisy)     the variance of a pixel's samples, from what its estimate says and from that of its box, which
 //                                                  is that of so many noisy pixels among quiet ones
@@ -128,6 +129,7 @@ void main() {
     int width = int(f.size.x), stride = int(p.stride), stride_bits = findMSB(stride);
     Filtered strip[FILTER_STRIP];
     uvec2 own_guides[FILTER_STRIP];
+    float own_classes[FILTER_STRIP];
     [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
         ivec2 pixel = corner + place_in_strip(k);
         uint at = image_index(f, uvec2(pixel));
@@ -139,6 +141,7 @@ void main() {
             continue;
         }
         ESTIMATE own = load_estimate(estimates, at);
+        own_classes[k] = filter_class(own);
         // a step with strides has a fixed radius; it is skipped where there are enough samples
         int radius = limited(stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples), p, own);
         if (radius == 0) {
@@ -180,6 +183,7 @@ void main() {
                     bool is_inside = uint(x - strip[k].lower.x) < counts[k] && (!FILTER_STRIDES || (dx & stride - 1) == 0);
                     // apart: what no lane of a subgroup does is skipped
                     if (!is_inside) continue;
+                    if (filter_class(e) != own_classes[k]) continue;
                     if (!is_neighbour(strip[k].edge, vec2(dx, (y - place_in_strip(k).y) * stride), own_guides[k], guide, normal)) continue;
                     strip[k].sum += sum;
                     strip[k].squares += squares;

@@ -7,8 +7,12 @@ struct RadianceEstimate {
     vec3 mean;
     float samples;
     vec3 variance;    // of one sample
-    float narrowed;   // by how much the filter's box is narrowed here, 0 to 1
+    float narrowed;   // by how much the filter's box is narrowed here, 0 to 1; or one of the following
 };
+
+// The box is not narrowed, and there is no history because the light of the pixel has changed from one frame to the next: to less, or to more.
+const float LIGHT_DARKENED = -1.0;
+const float LIGHT_BRIGHTENED = -2.0;
 
 const RadianceEstimate NO_RADIANCE = RadianceEstimate(vec3(0.0), 0.0, vec3(0.0), 0.0);
 

@@ -40,6 +40,8 @@ pub struct Frame<'a> {
     pub offset: [f32; 2],
     /// The camera or objects have moved since the previous frame.
     pub has_moved: bool,
+    /// From the space of the previous frame's camera to that of this one's, three rows.
+    pub previous_to_camera: [[f32; 4]; 3],
     /// There is a resolved image of the previous frame.
     pub has_resolved: bool,
     /// Samples at rest start anew: the image has not rested before, or those before this frame no longer count.
@@ -368,7 +370,7 @@ impl Graph {
         self.invalidate();
     }
 
-    /// Records, submits and waits for the stages that [`Graph::begin`] chose. Returns the times of passes, in order. With `control` each launch is a submission
+    /// Records, submits and waits for the stages that [`Graph::begin`] chose, or for some of them in their order. Returns the times of passes, in order. With `control` each launch is a submission
     /// of its own, and it is asked between them whether to stop.
     ///
     /// # Errors
@@ -428,8 +430,12 @@ impl Graph {
             })?);
             outcome?;
         }
-        self.begun.clear();
         Ok(timings)
+    }
+
+    /// After a frame whose stages have all run: it cannot be taken back any more.
+    pub fn finish(&mut self) {
+        self.begun.clear();
     }
 }
 

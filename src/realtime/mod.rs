@@ -41,6 +41,7 @@ pub use passes::display;
 pub(crate) use passes::nlmeans;
 pub use passes::nodes::NodeVisits;
 use passes::{debug, debug_view};
+use resample::SeenSurfaces;
 use resources::{Extent, Resource, SURFACE_BYTES};
 pub use settings::{Budget, Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
 
@@ -97,6 +98,8 @@ pub struct Realtime {
     state: State,
     is_radiance: bool,
     frame_samples: FrameSamples,
+    /// How much of an image the one before has shown, once it is needed.
+    seen: Option<SeenSurfaces>,
 }
 
 /// Which pass writes the displayed image.
@@ -147,6 +150,16 @@ struct State {
 
 /// Paths at rest begin at a multiple of this: 2^k samples of a sequence fill the square evenly only where the first one's index is a multiple of 2^k.
 const REST_BLOCK: u32 = 1 << 12;
+
+/// Index of the stage that finds the surfaces in view, of all pipelines.
+const SURFACES_STAGE: usize = 0;
+
+/// Share of the surfaces in view that the previous image has shown, below which a frame begins anew: the first frame of an image has its samples where they say most, and those of a frame that goes on with
+/// histories of few pixels are worse in all others.
+const LEAST_KNOWN: f64 = 1.0 / 3.0;
+
+/// Pixels by which that share is known.
+const KNOWN_PIXELS: u32 = 2048;
 
 /// Maximum samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
 const PAST_AFTER_NEW_LIGHT: f32 = 8.0;
@@ -200,6 +213,7 @@ impl Realtime {
             state: State::default(),
             is_radiance: false,
             frame_samples,
+            seen: None,
         })
     }
 
@@ -246,6 +260,7 @@ impl Realtime {
             state: State::default(),
             is_radiance: true,
             frame_samples,
+            seen: None,
         })
     }
 
@@ -393,6 +408,16 @@ impl Realtime {
         stats
     }
 
+    /// Returns true if the previous image may have shown little of what the camera sees now.
+    fn may_be_cut(&self, camera: &CameraRecord) -> bool {
+        let Some(before) = self.state.camera.filter(|before| before != camera) else { return false };
+        if !self.state.has_history || self.settings.technique == Technique::Larsen {
+            return false;
+        }
+        // paths wait for the host after the surfaces anyway
+        self.is_radiance || is_jump(&before, camera, self.settings.attenuation().reach())
+    }
+
     /// Radiance: has paths at rest begin with a block of the sequence.
     fn align_paths(&mut self, rest_starts: bool, resting: u32) {
         let (taken, begins_pattern) =
@@ -414,10 +439,10 @@ impl Realtime {
         &mut self,
         tracer: &Tracer,
         camera: &CameraRecord,
-        moved: &[MovedBounds],
-        control: Option<&mut dyn Control>,
+        moved_bounds: &[MovedBounds],
+        mut control: Option<&mut dyn Control>,
     ) -> Result<FrameStats> {
-        let moved = moved_records(moved);
+        let moved = moved_records(moved_bounds);
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass
         let is_undisturbed = !self.state.has_new_light && !self.state.was_interrupted;
@@ -478,6 +503,7 @@ impl Realtime {
             number: self.state.frame,
             offset,
             has_moved,
+            previous_to_camera: between(&self.state.camera.unwrap_or(*camera), camera),
             has_resolved: self.state.has_resolved,
             rest_starts,
             spreads,
@@ -500,10 +526,29 @@ impl Realtime {
             params: self.params.address(),
             display: self.display,
         };
-        let timings = self.graph.run(&frame, &stages, control)?;
+        let pixels = self.pixels();
+        // surfaces first where the camera may have jumped: histories are of little use then
+        let looks_first = stages.first() == Some(&SURFACES_STAGE) && self.may_be_cut(camera);
+        let (surfaces, others) = stages.split_at(usize::from(looks_first));
+        let mut timings = Vec::new();
+        if looks_first {
+            let asked = control.as_mut().map(|c| &mut **c as &mut dyn Control);
+            timings = self.graph.run(&frame, surfaces, asked)?;
+            let seen = match &mut self.seen {
+                Some(seen) => seen,
+                none => none.insert(SeenSurfaces::new(tracer)?),
+            };
+            let known = seen.share(frame.params, pixels as u32, sample_stride(self.size))?;
+            if known < LEAST_KNOWN {
+                self.graph.take_back();
+                self.rewind();
+                return self.try_frame(tracer, camera, moved_bounds, control);
+            }
+        }
+        timings.extend(self.graph.run(&frame, others, control)?);
+        self.graph.finish();
         tracer.check_finished()?;
         let occlusion_rays = self.graph.rays()?;
-        let pixels = self.pixels();
         let period = self.settings.resolution.period();
         let all = pixels * u64::from(samples) / u64::from(if is_long && !self.is_radiance { 1 } else { period });
         self.state.frame = self.state.frame.wrapping_add(1);
@@ -734,10 +779,43 @@ fn sample_offset(frame: u32) -> [f32; 2] {
     [0.754_877_666_246_693, 0.569_840_290_998_053].map(|step: f64| ((0.5 + f64::from(frame) * step).fract() - 0.5) as f32)
 }
 
+/// Returns true if a camera has turned, moved or zoomed by more than a camera in motion does from frame to frame: by an eighth of the view, or of the length of occlusion rays.
+fn is_jump(before: &CameraRecord, now: &CameraRecord, reach: f64) -> bool {
+    const PART: f64 = 0.125;
+    let change = |column: usize| {
+        let squares =
+            (0..3).map(|row| f64::from(now.camera_to_world[row][column] - before.camera_to_world[row][column]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    // half angles are about their tangents
+    let view = if now.orthographic { 1.0 } else { 2.0 * f64::from(now.view[1]).min(1.0) };
+    let has_turned = (0..3).any(|axis| change(axis) > PART * view);
+    let zoom = f64::from(now.view[1] / before.view[1]);
+    has_turned || change(3) > PART * reach || now.orthographic != before.orthographic || !(0.5..2.0).contains(&zoom)
+}
+
+/// One of how many pixels tells what of an image is known: a number that has no divisor in common with the width, so that they are in all columns.
+fn sample_stride(size: [u32; 2]) -> u32 {
+    let least = (size[0] * size[1] / KNOWN_PIXELS).max(1);
+    (least..).find(|stride| gcd(*stride, size[0]) == 1).unwrap_or(1)
+}
+
+fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
 /// World to camera, from camera to world.
 pub(super) fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
+    rows(&to_world(camera).inverse())
+}
+
+/// From the space of one camera to that of another.
+fn between(from: &CameraRecord, to: &CameraRecord) -> [[f32; 4]; 3] {
+    rows(&(to_world(to).inverse() * to_world(from)))
+}
+
+fn to_world(camera: &CameraRecord) -> DAffine3 {
     let m = camera.camera_to_world.map(|row| row.map(f64::from));
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
-    let to_world = DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3));
-    rows(&to_world.inverse())
+    DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3))
 }

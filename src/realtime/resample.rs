@@ -1,11 +1,12 @@
 //! Histories of a pipeline of another size, so that an image whose resolution changes does not begin with noise.
 
+use super::graph::Params;
 use super::resources::Resource;
 use super::settings::Technique;
 use super::{FrameParams, Realtime, State};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::gpu::{Buffer, Commands, Memory};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory};
 use crate::interface::records::passes::{ResampleParams, SeenParams};
 use crate::shaders::{self, LANES};
 use crate::tracer::{Push, Tracer};
@@ -90,19 +91,51 @@ impl Realtime {
             surface: theirs.address(Resource::Surface),
             normals: theirs.address(Resource::Normals),
             previous_guide: ours.address(Resource::Guide),
+            previous_position: 0,
             ..self.frame_params(camera, false, other.state.offset)
         };
         // of the next frame, which is not yet there
         self.params.write(&frame)?;
+        SeenSurfaces::new(tracer)?.share(self.params.address(), other.pixels() as u32, 1)
+    }
+}
+
+/// Counts surfaces that an image shows, and those of them that the last frame of this or another pipeline shows as well.
+pub struct SeenSurfaces {
+    pipeline: ComputePipeline,
+    params: Params<SeenParams>,
+    counts: Buffer,
+    commands: Commands,
+}
+
+impl SeenSurfaces {
+    /// Compiles the pass.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn new(tracer: &Tracer) -> Result<Self> {
         let device = tracer.device();
-        let mut counts = Buffer::new(device, "surfaces seen", 8, Memory::Device)?;
-        counts.write(0, &[0; 8])?;
-        let record = SeenParams { frame: self.params.address(), counts: counts.address() };
-        let params = Buffer::from_slice(device, "parameters of surfaces seen", &[record])?;
-        let pipeline = shaders::SEEN.pipeline(device)?;
-        let push = Push { pass: params.address(), count: other.pixels() as u32, ..Default::default() };
-        Commands::new(device)?.run(|r| r.dispatch(&pipeline, &push, push.count.div_ceil(LANES)))?;
-        let [surfaces, seen]: [u32; 2] = bytemuck::pod_read_unaligned(&counts.read(0, 8)?);
+        Ok(Self {
+            pipeline: shaders::SEEN.pipeline(device)?,
+            params: Params::new(device, "parameters of surfaces seen")?,
+            counts: Buffer::new(device, "surfaces seen", 8, Memory::Readback)?,
+            commands: Commands::new(device)?,
+        })
+    }
+
+    /// Share of the surfaces in one of `stride` pixels of an image that the frame before shows; 1 where there are none. `frame`: address of `FrameParams` whose G-buffer is that of the image.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn share(&mut self, frame: u64, pixels: u32, stride: u32) -> Result<f64> {
+        self.params.write(&SeenParams { frame, counts: self.counts.address(), stride, reserved: 0 })?;
+        let push = Push { pass: self.params.address(), count: pixels.div_ceil(stride), ..Default::default() };
+        self.commands.run(|r| {
+            r.fill(&self.counts, 8, 0);
+            r.barrier();
+            r.dispatch(&self.pipeline, &push, push.count.div_ceil(LANES));
+        })?;
+        let [surfaces, seen]: [u32; 2] = bytemuck::pod_read_unaligned(&self.counts.read(0, 8)?);
         // an empty view has nothing to lack
         Ok(if surfaces == 0 { 1.0 } else { f64::from(seen) / f64::from(surfaces) })
     }

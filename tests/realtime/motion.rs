@@ -336,6 +336,81 @@ fn gpu_what_has_moved_leaves_no_ghost() {
     assert_validation_clean(&device);
 }
 
+/// What a thin pole uncovers shows nothing of the pole, neither at once nor some frames later.
+#[test]
+fn gpu_what_a_thin_pole_uncovers_is_what_is_there() {
+    const FRAMES: u32 = 20;
+    let device = device();
+    let floor = triangles(shapes::floor(DVec3::ZERO, 12.0));
+    let pole = triangles(shapes::cuboid(DVec3::new(-0.1, 0.001, -0.1), DVec3::new(0.1, 2.0, 0.1)));
+    let camera = Camera::look_at(DVec3::new(0.0, 3.0, 5.0), DVec3::new(0.0, 0.5, 0.0), DVec3::Y, 0.8);
+    let scene = scene_of(vec![floor, pole], camera);
+    let camera = record(&scene, &scene.cameras[0], SIZE);
+    let place = |frame: u32| at(DAffine3::from_translation(DVec3::X * (0.2 * f64::from(frame) - 2.0)));
+    for (preset, kind) in [Preset::Fast, Preset::Balanced, Preset::Quality].into_iter().zip(tracers(&device)) {
+        let settings = Settings { antialias: true, converge: true, ..traced(preset) };
+        let mut tracer = moving(&device, kind, &scene, vec![1]);
+        let mut poses = Vec::new();
+        for frame in FRAMES - 6..FRAMES {
+            tracer.update(&place(frame)).unwrap();
+            poses.push((reference(&tracer, SIZE, &settings, &camera), instances(&tracer, &camera)));
+        }
+        let (truth, now) = poses.pop().unwrap();
+        let mut realtime = realtime(&tracer, SIZE, &settings);
+        for frame in 0..FRAMES {
+            let moved = tracer.update(&place(frame)).unwrap().moved;
+            realtime.frame(&tracer, &camera, &moved).unwrap();
+        }
+        let image = realtime.result().unwrap();
+        let interior =
+            |ids: &[u32], k: usize, id: u32| [0, 1, usize::MAX].into_iter().all(|step| ids[k.wrapping_add(step)] == id);
+        for (frames, (before, covered)) in poses.iter().rev().enumerate() {
+            let inside = 1..now.len() - 1;
+            let is_uncovered = |k: usize| inside.contains(&k) && interior(covered, k, 1) && interior(&now, k, 0);
+            let mask: Vec<f32> = (0..now.len()).map(|k| if is_uncovered(k) { 1.0 } else { 0.0 }).collect();
+            let left = Residual::of(&image, &truth, before, Some(&mask)).unwrap();
+            println!("{kind}, {preset}: {frames} frames after: {left:?}");
+            assert!(left.share.abs() < 0.05 + 3.0 * left.standard_error, "{kind}, {preset}, {frames} frames after: {left:?}");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// A camera that jumps to other surfaces begins anew, and one that is told to: the frames are those of an image that begins there.
+#[test]
+fn gpu_after_a_cut_frames_are_those_of_a_fresh_start() {
+    let device = device();
+    let scene = block_on_a_floor();
+    let view = |eye: DVec3, target: DVec3| record(&scene, &Camera::look_at(eye, target, DVec3::Y, 0.6), SIZE);
+    let eye = DVec3::new(0.0, 2.0, 3.0);
+    let [block, step] = [0.0, 0.02].map(|x| view(eye, DVec3::new(x, 0.5, 0.0)));
+    let elsewhere = view(eye, DVec3::new(3.0, 0.0, 4.0));
+    for (preset, kind) in [Preset::Balanced, Preset::Quality].into_iter().zip(tracers(&device)) {
+        let settings = Settings { antialias: true, converge: true, ..traced(preset) };
+        let tracer = tracer(&device, kind, &scene);
+        let shown = |realtime: &mut Realtime, camera: &CameraRecord| -> Vec<Vec<f32>> {
+            let one = |_| {
+                frames(realtime, &tracer, camera, 1);
+                realtime.result().unwrap()
+            };
+            (0..3).map(one).collect()
+        };
+        let after_block = |is_declared: bool, camera: &CameraRecord| {
+            let mut realtime = realtime(&tracer, SIZE, &settings);
+            frames(&mut realtime, &tracer, &block, 6);
+            if is_declared {
+                realtime.rewind();
+            }
+            shown(&mut realtime, camera)
+        };
+        let fresh = |camera: &CameraRecord| shown(&mut realtime(&tracer, SIZE, &settings), camera);
+        assert!(after_block(true, &step) == fresh(&step), "{kind}, {preset}: a cut that is declared");
+        assert!(after_block(false, &elsewhere) == fresh(&elsewhere), "{kind}, {preset}: a jump to other surfaces");
+        assert!(after_block(false, &step) != fresh(&step), "{kind}, {preset}: a step is no cut");
+    }
+    assert_validation_clean(&device);
+}
+
 /// What moves behind the camera, farther off than rays reach: histories stay as they are.
 #[test]
 fn gpu_what_moves_far_away_costs_no_history() {

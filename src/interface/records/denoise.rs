@@ -18,7 +18,7 @@ records! {
         samples: float,
         /// Variance of one sample, by channel.
         variance: vec3,
-        /// By how much the filter's box is narrowed here: 0 not at all, 1 to the pixel itself.
+        /// By how much the filter's box is narrowed here: 0 not at all, 1 to the pixel itself; negative where light has changed from one frame to the next.
         narrowed: float,
     }
 

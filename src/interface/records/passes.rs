@@ -167,5 +167,9 @@ records! {
         frame: address,
         /// Two `uint`: pixels of the other image that show a surface, and those of them whose surface this image shows as well.
         counts: address,
+        /// One of so many pixels is counted.
+        stride: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 }

@@ -140,7 +140,9 @@ records! {
     }
 
     /// Parameters of `antialias`.
-    AntialiasParams: block readonly 8 {
+    AntialiasParams: block readonly 16 {
+        /// From the space of the previous frame's camera to that of this one's, three rows.
+        previous_to_camera: vec4[3],
         /// Address of the `FrameParams`.
         frame: address,
         /// Radiance and coverage, a `vec4` per pixel; 0: `visibility` is the input.
@@ -157,10 +159,24 @@ records! {
         denoised: address,
         /// Output, a `vec4` per pixel: value, and coverage.
         resolved: address,
+        /// `MovedRecord`s of this frame.
+        moved: address,
+        /// Histories of diffuse reflection, a `RadianceRecord` per pixel, where light may have changed since the previous frame; 0: it has not.
+        changed: address,
+        /// Number of `MovedRecord`s.
+        moved_count: uint,
+        /// 1: the camera or objects have moved, so that surfaces may have come into sight.
+        uncovers: uint,
         /// 1: there is a history.
         has_history: uint,
         /// Maximum number of frames of a history in motion.
         most_frames: float,
+        /// The same of a pixel in which nothing moves.
+        most_still_frames: float,
+        /// Padding.
+        reserved: float,
+        /// Where this frame's samples lie from the middle of their pixels, pixels; 0 where each has a place of its own.
+        samples_at: vec2,
         /// Half width of the clamp of a history in motion, in standard deviations of the neighbourhood.
         clamp_width: float,
         /// Minimum weight of a frame at rest.

@@ -1,10 +1,11 @@
 //! `antialias`: the mean over frames whose samples lie at different places within the pixels, and at rest what the image converges to.
 
 use crate::error::Result;
-use crate::gpu::{ComputePipeline, Recorder};
+use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::interface::records::radiance::AntialiasParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::params::{MAX_MOVED, MovedRecord};
 use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
@@ -13,6 +14,8 @@ use crate::tracer::Tracer;
 const MAX_FRAMES: f32 = 8.0;
 /// The same of radiance, which has reflections that move otherwise than their surfaces.
 const RADIANCE_FRAMES: f32 = 4.0;
+/// The same of both in pixels in which nothing moves: their history is not interpolated.
+const STILL_FRAMES: f32 = 16.0;
 /// The same after lights or materials have changed.
 const NEW_LIGHT_FRAMES: f32 = 2.0;
 /// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs from the one before by the edges that its filter sees.
@@ -23,6 +26,7 @@ const CLAMP_WIDTH: f32 = 1.25;
 struct Antialias {
     pipeline: ComputePipeline,
     params: Params<AntialiasParams>,
+    moved: Buffer,
     /// `Composed`, or `Result` of ambient visibility.
     input: Resource,
     has_rest: bool,
@@ -31,9 +35,11 @@ struct Antialias {
 /// The pass over all pixels. `input`: [`Resource::Composed`] or [`Resource::Result`].
 pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> Result<Stage> {
     let device = tracer.device();
+    let moved_bytes = (MAX_MOVED * size_of::<MovedRecord>()) as u64;
     let pass = Antialias {
         pipeline: shaders::ANTIALIAS.pipeline(device)?,
         params: Params::new(device, "parameters of antialiasing")?,
+        moved: Buffer::new(device, "moved objects", moved_bytes, Memory::Upload)?,
         input,
         has_rest,
     };
@@ -65,20 +71,26 @@ impl LongFrame {
 
 impl Pass for Antialias {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{Denoised, FrameNumber, Guide, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface};
+        use Resource::{
+            Denoised, DiffuseHistory, FrameNumber, Guide, Normals, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface,
+        };
         let rest: &[Resource] = if self.has_rest { &[Rest, Denoised] } else { &[] };
-        ResourceUse::new(&[FrameNumber, Guide, Surface, PreviousPosition, self.input], &[ResolvedHistory, Resolved])
-            .previous(&[ResolvedHistory])
+        let light: &[Resource] = if self.input == Resource::Composed { &[DiffuseHistory] } else { &[] };
+        ResourceUse::new(&[FrameNumber, Guide, Surface, Normals, PreviousPosition, self.input], &[ResolvedHistory, Resolved])
+            .previous(&[Guide, ResolvedHistory])
             .and_reads(rest)
+            .and_reads(light)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        self.moved.write(0, bytemuck::cast_slice(frame.moved))?;
         let input = resources.address(self.input);
         let is_composed = self.input == Resource::Composed;
         let is_light_at_rest = is_composed && self.has_rest;
         let long = LongFrame::of(frame).filter(|_| is_light_at_rest);
         let of_long = |f: fn(&LongFrame) -> f32| long.as_ref().map_or(0.0, f);
         self.params.write(&AntialiasParams {
+            previous_to_camera: frame.previous_to_camera,
             frame: frame.params,
             composed: if is_composed { input } else { 0 },
             visibility: if is_composed { 0 } else { input },
@@ -87,6 +99,13 @@ impl Pass for Antialias {
             rest: resources.address(Resource::Rest),
             denoised: if frame.has_denoised { resources.address(Resource::Denoised) } else { 0 },
             resolved: resources.address(Resource::Resolved),
+            moved: self.moved.address(),
+            changed: match is_composed && (frame.has_new_light() || !frame.moved.is_empty()) {
+                true => resources.address(Resource::DiffuseHistory),
+                false => 0,
+            },
+            moved_count: frame.moved.len() as u32,
+            uncovers: frame.has_moved.into(),
             has_history: frame.has_resolved.into(),
             most_frames: match frame.settings.antialias {
                 true if frame.has_new_light() => NEW_LIGHT_FRAMES,
@@ -94,6 +113,9 @@ impl Pass for Antialias {
                 true => MAX_FRAMES,
                 false => 1.0,
             },
+            most_still_frames: if frame.has_new_light() { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
+            reserved: 0.0,
+            samples_at: if frame.spreads { [0.0; 2] } else { frame.offset },
             clamp_width: CLAMP_WIDTH,
             holds: (!is_composed && frame.is_long).into(),
             resting: frame.resting as f32,
