@@ -7,6 +7,7 @@ mod camera_path;
 mod environment;
 mod errors;
 mod export;
+mod exporters;
 mod fuzz;
 mod geometry;
 mod hierarchy;

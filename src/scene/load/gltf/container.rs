@@ -128,7 +128,8 @@ fn other_version(version: &str, path: &Path) -> Error {
 
 /// The document without what a still image does not need and the crate is too strict about: it wants `nodes` in a scene
 /// and `node` in the target of an animation, both optional by the specification (for scenes without content, and for
-/// KHR_animation_pointer), and it refuses numbers beyond the range of single precision. `None` if that does not help.
+/// KHR_animation_pointer), and clipping planes of cameras, which some files lack; and it refuses numbers beyond the range of
+/// single precision. `None` if that does not help.
 fn lenient(text: &[u8]) -> Option<Root> {
     let mut root: Value = serde_json::from_slice(text).ok()?;
     for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
@@ -136,6 +137,14 @@ fn lenient(text: &[u8]) -> Option<Root> {
     }
     for animation in root.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
         *animation = json!({ "channels": [], "samplers": [] });
+    }
+    for camera in root.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten() {
+        for (lens, planes) in [("perspective", &["znear"][..]), ("orthographic", &["znear", "zfar"][..])] {
+            let Some(lens) = camera.get_mut(lens).and_then(Value::as_object_mut) else { continue };
+            for plane in planes {
+                lens.entry(*plane).or_insert_with(|| json!(0.0));
+            }
+        }
     }
     root.as_object_mut()?.remove("skins");
     serde_json::from_value(root).ok()

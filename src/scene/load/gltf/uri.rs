@@ -78,10 +78,10 @@ fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
         let cut = String::from_utf8(percent_decode(&uri.as_bytes()[..end]).into_owned());
         names.extend(cut.map(|cut| cut.replace('\\', "/")));
     }
-    let drive = |name: &str| name.as_bytes().get(1) == Some(&b':');
-    if slashes.starts_with('/') || drive(&slashes) {
-        names.push(slashes.trim_start_matches('/').to_owned());
-        names.extend(slashes.rsplit('/').next().filter(|name| !name.is_empty()).map(str::to_owned));
+    let is_absolute = |name: &str| name.starts_with('/') || name.as_bytes().get(1) == Some(&b':');
+    for name in [slashes, uri.replace('\\', "/")].into_iter().filter(|name| is_absolute(name)) {
+        names.push(name.trim_start_matches('/').to_owned());
+        names.extend(name.rsplit('/').next().filter(|name| !name.is_empty()).map(str::to_owned));
     }
     let mut paths: Vec<PathBuf> = Vec::new();
     for name in names {
