@@ -281,7 +281,8 @@ def measure(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str,
     SCENES[name](s)
     gltf, entry = folder / f"{name}.gltf", {"name": name, "judge": "stock"} | s.more
     s.writer.write(gltf)
-    seeds = {spp: range(FIRST_SEED, FIRST_SEED + args.seeds * max(64, spp and 256 // max(spp, 64) * 64) // 128) for spp in SPP}
+    # as many seeds for 16 samples as for 64
+    seeds = {spp: range(FIRST_SEED, FIRST_SEED + args.seeds * 128 // max(spp, 64)) for spp in SPP}
     reference_seeds = range(FIRST_REFERENCE_SEED, FIRST_REFERENCE_SEED + args.reference_parts)
 
     def all_of(draw: Callable[[int, int], np.ndarray]) -> dict[str, np.ndarray]:
@@ -339,7 +340,7 @@ def main() -> None:
     parser.add_argument("binary", type=Path, help="skylit, built for release")
     parser.add_argument("names", nargs="*", help=f"scenes of {', '.join(SCENES)}; all without")
     parser.add_argument("--size", type=int, default=48, help="side of the images, pixels (48)")
-    parser.add_argument("--seeds", type=int, default=8, help="half of them for %d samples, twice as many for %d (8)" % (SPP[1], SPP[0]))
+    parser.add_argument("--seeds", type=int, default=8, help="half of them for 256 samples, twice as many for 16 and 64 (8)")
     parser.add_argument("--reference-spp", type=int, default=2048, help="samples of each part of a reference (2048)")
     parser.add_argument("--reference-parts", type=int, default=4, help="parts of a reference, with seeds of their own (4)")
     parser.add_argument("--mitsuba", type=Path, help="folder that keeps Mitsuba's images for the next run")

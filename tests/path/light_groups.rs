@@ -23,9 +23,9 @@ fn ground(side: f64) -> Scene {
     scene_of(vec![(shapes::floor(DVec3::ZERO, side), matte(0.5))], camera)
 }
 
-/// The same ground, seen in a mirror: the path's first bounce is none that lights are sampled at.
+/// The same ground, seen in a mirror: the path's first bounce is none that lights are sampled at. The mirror fills the view, and the ground reflects no further.
 fn mirrored_ground(side: f64) -> Scene {
-    let camera = Camera::look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 0.2, -3.0), DVec3::Y, 0.3);
+    let camera = Camera::look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 0.55, -3.0), DVec3::Y, 0.16);
     let mirror = Material { kind: MaterialKind::Mirror, specular_color: Vec3::ONE, ..Material::default() };
     let wall = shapes::rectangle(DVec3::new(0.0, 1.0, -3.0), DVec3::X * 4.0, DVec3::Y * 1.8);
     scene_of(vec![(shapes::floor(DVec3::ZERO, side), matte(0.5)), (wall, mirror)], camera)
@@ -101,7 +101,7 @@ fn adds_up(device: &Arc<Device>, what: &str, scene: &Scene, sources: [&Source; 2
 fn gpu_a_lamp_is_found_beside_a_sky_on_any_ground() {
     let device = device();
     let at = DVec3::Y * HEIGHT;
-    for side in [20.0, 200.0, 1e3, 1e4, 1e6] {
+    for side in [20.0, 1e3, 1e6] {
         let scene = ground(side);
         let sky = sky(0.2);
         adds_up(&device, &format!("point, {side}"), &scene, [&lamp(LightKind::Point, at, 3.2), &sky], &options(SPP, 1), 0.02);
