@@ -40,6 +40,7 @@ pub fn settings(pose: &str) -> Option<CameraSettings> {
         target: Some(vector("target")?),
         up: Some(vector("up")?),
         fov_y: Some(pose["fov_y"].as_f64()?),
+        clip: serde_json::from_value(pose["clip"].clone()).ok(),
         ..CameraSettings::default()
     })
 }

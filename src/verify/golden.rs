@@ -157,6 +157,7 @@ impl Golden {
         // nothing else of what the file says
         let mut chosen = RenderSettings { camera: named.camera, lighting: named.lighting, ..RenderSettings::default() };
         chosen.integrators.ao.ao_radius = named.integrators.ao.ao_radius;
+        chosen.image.size = named.image.size;
         let frames = &settings.frames;
         let is_moving = frames.orbit.is_some() || frames.camera_path.is_some();
         let is_open = !settings.camera.chooses() && !has_camera || settings.camera.view.is_some();
@@ -172,7 +173,10 @@ impl Golden {
             let radius = radius.parse::<f64>().ok().filter(|r| *r > 0.0).ok_or_else(|| broken(key::AO_RADIUS))?;
             chosen.integrators.ao.ao_radius = Some(Length::Units(radius));
         }
+        // a camera is replaced as a whole, and planes are not chosen
+        let clip = settings.camera.clip;
         *settings = settings.overridden_by(&chosen);
+        settings.camera.clip = clip.or(settings.camera.clip);
         Ok(())
     }
 

@@ -103,8 +103,8 @@ impl AoVersusPathSettings {
         path.integrator = Some("path".parse()?);
         path.image.size = Some(self.size);
         let completed = renderer.complete(&path, None)?;
-        let all = path.overridden_by(&completed.chosen);
-        Ok((Self { camera: all.camera, lighting: all.lighting, ..self.clone() }, completed))
+        let (camera, lit) = (completed.settings.camera.clone(), path.overridden_by(&completed.chosen));
+        Ok((Self { camera, lighting: lit.lighting, ..self.clone() }, completed))
     }
 
     /// The commands that render the best `lit` image and the path-traced one that it is compared with.
