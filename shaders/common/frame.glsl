@@ -146,18 +146,18 @@ EdgeTest edge_test(FrameParams f, uvec2 guide, vec3 normal, vec2 centre) {
 }
 
 // Distance of a neighbour from the plane, on the side of its normal. `offset`: from the point to the neighbour, in pixels.
-float plane_distance(EdgeTest e, vec2 offset, float depth) {
+float distance_from_plane(EdgeTest e, vec2 offset, float depth) {
     float s = e.at + offset.x * e.right + offset.y * e.down;
     return (e.orthographic ? s + depth * e.by_depth : s * depth) - e.distance;
 }
 
 bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     // false where the depth is infinite
-    return abs(plane_distance(e, offset, uintBitsToFloat(guide.x))) <= e.tolerance;
+    return abs(distance_from_plane(e, offset, uintBitsToFloat(guide.x))) <= e.tolerance;
 }
 
 // Whether a neighbour of that depth is in front of the plane. Normals are on the viewer's side.
-bool in_front(EdgeTest e, vec2 offset, float depth) { return plane_distance(e, offset, depth) > e.tolerance; }
+bool in_front(EdgeTest e, vec2 offset, float depth) { return distance_from_plane(e, offset, depth) > e.tolerance; }
 
 // The normal in a guide, to be computed once for many tests. As unpackSnorm4x8 has it, but for its divisions and its clamps of -128, which pack_normal does not make.
 vec3 guide_normal(uvec2 guide) {

@@ -302,7 +302,7 @@ mod tests {
         let scene = text("scene");
         assert!(scene.contains("readonly buffer InstanceRecords { InstanceRecord v[]; };"), "{scene}");
         assert!(scene.contains("    vec4 group_to_world[3];"), "{scene}");
-        assert!(scene.contains("uvec2 w9 = LOAD_PAIR(base, 10u * k + 9u);"), "{scene}");
+        assert!(scene.contains("uvec2 w11 = LOAD_PAIR(base, 12u * k + 11u);"), "{scene}");
         assert!(scene.contains("    return SubmeshRecord(uvec2(w0.x, w0.y), "), "{scene}");
         assert!(
             text("lights")

@@ -104,7 +104,7 @@ settings! {
         /// Play an animation of the scene, by index or name [default: the first]
         animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(TIMELINE);
         /// Hold the animation at this time, in seconds since its start [default: frames play it]
-        time: Option<f64>, option(value_name = "SECONDS", value_parser = parse_playback_time), applies(TIMELINE), basic;
+        time: Option<f64>, option(value_name = "SECONDS", value_parser = parse_playback_time), applies(TIMELINE);
         /// Animate the camera along the key frames of a file (docs/sequences.md)
         camera_path: Option<PathBuf>,
             option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),

@@ -15,7 +15,7 @@ use skylit::oracle::closed_form as exact;
 use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::stress::closed_forms::{self, Bias, Case, on_plane, options};
-use skylit::stress::lengths::{Kerb, hit_bound};
+use skylit::stress::lengths::Kerb;
 use skylit::stress::scale::{can_bake, floor_beside_sphere, places};
 use skylit::tracer::TracerKind;
 

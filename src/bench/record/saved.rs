@@ -161,12 +161,13 @@ mod tests {
         assert_eq!(kind(&serde_json::to_string(&PathBenchmark::default()).unwrap()).unwrap(), BenchKind::Path);
         assert_eq!(kind(r#"{"benchmark":"frames"}"#).unwrap(), BenchKind::Frames);
         assert_eq!(kind(r#"{"benchmark":"ao"}"#).unwrap(), BenchKind::Ao);
-        for broken in ["", "[]", "{}", r#"{"benchmark":"time"}"#, r#"{"benchmark":"ao","views":3}"#] {
+        for broken in ["[]", "{}", r#"{"benchmark":"time"}"#, r#"{"benchmark":"ao","views":3}"#] {
             let error = read(broken).unwrap_err();
             assert!(
                 error.exit_code() == 3 && error.to_string().contains("is no record of `skylit bench`"),
                 "{broken}: {error}"
             );
         }
+        assert!(read("").unwrap_err().to_string().contains("is empty"));
     }
 }

@@ -173,7 +173,7 @@ pub struct AoVersusPath {
 }
 
 /// Samples per pixel of the images that commands of the report make: their noise is then less than most errors.
-const COMMAND_SPP: u32 = 256;
+const COMMAND_SPP: u32 = 1024;
 
 /// Compares ambient light with path tracing. Camera and light that settings leave open are chosen as [`Renderer::complete`] does for `path`, and the report names them.
 ///
