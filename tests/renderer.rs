@@ -262,7 +262,7 @@ fn gpu_the_scene_decides_what_settings_leave_open() {
     let (_, choices, _, fifth) = still(&mut room, ao("20%".into()));
     let of_diagonal: f64 = fifth.metadata("ao.radius").unwrap().parse().unwrap();
     assert!(
-        (of_diagonal / (0.2 * (hi - lo).length()) - 1.0).abs() < 1e-12 && choices.contains("20%"),
+        (of_diagonal / (0.2 * (hi - lo).length()) - 1.0).abs() < 5e-6 && choices.contains("20%"),
         "{of_diagonal} {choices}"
     );
 
