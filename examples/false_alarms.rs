@@ -37,7 +37,7 @@ fn main() -> Result<()> {
         let (kind, _) = skylit::tracer::TracerKind::auto(session.info());
         let mut estimates = Vec::new();
         for seed in 0..runs as u32 {
-            estimates.push(Estimate::of(&session.render(&frame, kind, Some(seed), &mut NoControl)?)?);
+            estimates.push(Estimate::of(&session.render(&frame, kind, Some(seed), None, &mut NoControl)?)?);
         }
         if !changed {
             let golden = Golden::load(&manifest.golden(&frame))?;

@@ -298,7 +298,7 @@ fn gpu_what_is_compiled_is_told() {
     let light = "spot position=0.1,1,0.1 direction=0,-1,0 outer=40 intensity=3";
     let spot = told(&["--sampling", "light", "--light", light]);
     assert!(
-        spot.contains("require emissive rectangles, spot lights, surfaces that light samples find, a choice among lights, light samples; specialized out"),
+        spot.contains("require emissive rectangles, spot lights, light tree, surfaces that light samples find, light samples; specialized out"),
         "{spot}"
     );
     let bsdf = told(&["--sampling", "bsdf", "--light", light, "--firefly-clamp", "9"]);
