@@ -198,7 +198,10 @@ bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, v
         if (sum > 0.0) weights = exact / sum;
         // A ray that passes just beside the triangle, between its rounded edges, meets the plane elsewhere, or never; and its neighbour
         // does not expect it. It must not slip through: it meets the edge.
-        t = is_beside ? dot(weights, z) : plane_distance(origin, direction, v0, v1, v2, scale);
+        // A needle's plane is all rounding: a hit is no nearer and no farther than its corners.
+        float in_plane = plane_distance(origin, direction, v0, v1, v2, scale), slack = 4.0 * HALF_ULP * farthest;
+        bool is_within = in_plane >= first - slack && in_plane <= last + slack;
+        t = is_beside || !is_within ? dot(weights, z) : in_plane;
     }
     return plausible && t > tmin && t < tmax;
 }

@@ -76,6 +76,7 @@ impl Renderer {
 
         // the camera, by which the others are chosen
         let found = if camera.is_some() { None } else { settings.camera.automatic(&survey, aspect)? };
+        let view = settings.camera.view;
         if let Some(found) = found {
             chosen.camera = found.settings();
             let none = if settings.camera.view.is_some() { "" } else { "the scene has none and is seen " };
@@ -84,10 +85,13 @@ impl Renderer {
             settings.camera.view = None;
             settings.camera.override_with(&found.settings());
         }
-        let camera = match camera {
+        let mut camera = match camera {
             Some(camera) => camera,
             None => settings.camera.choose(&survey, aspect)?,
         };
+        if let Some(view) = view {
+            camera.name = view.to_string();
+        }
         choices.extend(clipped(&camera, &survey));
 
         // the AO radius
