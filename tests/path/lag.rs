@@ -57,39 +57,6 @@ fn frames(tracer: &Tracer, flat: &FlatScene, preset: Preset, seed: u32) -> Realt
     Realtime::radiance(tracer, flat, SIZE, &settings, &options).unwrap()
 }
 
-/// The shadow of a pole is two pixels wide, and moves by as much from frame to frame: where it has come it is nearly as dark as in a still.
-#[test]
-fn gpu_frames_thin_shadows_move() {
-    const FRAMES: u32 = 10;
-    let device = device();
-    let at = |frame: u32| {
-        let angle = f64::to_radians(-50.0 + 2.4 * f64::from(frame));
-        poles(0.2, &[-2.0, 0.0, 2.0], DMat3::from_rotation_y(-angle) * DVec3::new(0.0, -1.0, -1.1))
-    };
-    let (scene, last, before) = (at(0), at(FRAMES - 1), at(FRAMES - 3));
-    let [flat, last, before] = [&scene, &last, &before].map(FlatScene::for_paths);
-    let tracer = tracer(&device, TracerKind::Compute, &flat);
-    let [now, past] = [&last, &before].map(|flat| still(&self::tracer(&device, TracerKind::Compute, flat), flat));
-    let darkened: Vec<usize> = (0..now.len()).filter(|&k| now[k] > 0.0 && now[k] < 0.5 * past[k]).collect();
-    assert!(darkened.len() >= 8, "{} pixels", darkened.len());
-    for preset in [Preset::Fast, Preset::Balanced, Preset::Quality] {
-        let mut frames = frames(&tracer, &flat, preset, 1);
-        for frame in 0..FRAMES {
-            let posed = at(frame);
-            if frame > 0 {
-                frames.move_lights(&tracer, &posed).unwrap();
-            }
-            frames.frame(&tracer, &record(&posed), &[]).unwrap();
-        }
-        let image = red(&frames.result().unwrap());
-        let sum = |a: &[f32], b: &[f32]| darkened.iter().map(|&k| f64::from(a[k] - b[k])).sum::<f64>();
-        let kept = sum(&past, &image) / sum(&past, &now);
-        println!("{preset}: {kept:.2} of the contrast of a shadow in {} pixels", darkened.len());
-        assert!((0.5..1.3).contains(&kept), "{preset}: {kept}");
-    }
-    assert_validation_clean(&device);
-}
-
 /// A pole that moves before the edge between floor and wall, whose values are far apart: no clip to values nearby tells that it was there.
 #[test]
 fn gpu_frames_what_is_uncovered_at_an_edge_has_no_ghost() {
