@@ -182,8 +182,8 @@ bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, v
     // Edge functions round in proportion to the corners' distances from the ray, which is decimetres of t where a wall of a
     // kilometre is met at a centimetre. A surface just in front of the ray must not be lost, nor one found again that the ray has
     // just left. So where the error of t, and of the point that the weights mean, may be too large a share of t, both are
-    // computed again with twice the digits. If all roundings were at their worst, the bound would be 36 of its units (after pbrt-v4,
-    // 6.8.7); no more than 2 are found over thin and thick triangles from near and far, and the rest is margin.
+    // computed again with twice the digits. The bound is for roundings as they come: were all of them at
+    // their worst, it would be 36 of its units instead of 8 (after pbrt-v4, 6.8.7).
     vec3 x = max(abs(vec3(a.p.x, b.p.x, c.p.x)), abs(vec3(a.p.y, b.p.y, c.p.y))), z = vec3(a.z, b.z, c.z) * shear.s.z;
     float aside = max(max(x.x, x.y), x.z), first = min(min(z.x, z.y), z.z), last = max(max(z.x, z.y), z.z);
     float farthest = max(-first, last);

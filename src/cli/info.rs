@@ -228,11 +228,11 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     let device = crate::gpu::Device::open(&args.device.options())?;
     let mut renderer = Renderer::new(device, scene, &args.device)?.with_name(&args.scene);
     let mut control = SilentControl;
-    let mut asked = RenderSettings { scene: args.meaning.clone(), ..Default::default() };
-    asked.image.size = args.size;
+    let mut requested = RenderSettings { scene: args.meaning.clone(), ..Default::default() };
+    requested.image.size = args.size;
 
     // what is chosen for images of this size
-    let by_itself = renderer.complete(&asked, None)?;
+    let by_itself = renderer.complete(&requested, None)?;
     let size = by_itself.settings.size(renderer.scene());
     let mut settings =
         RenderSettings { scene: args.meaning.clone(), camera: by_itself.chosen.camera.clone(), ..Default::default() };
@@ -240,10 +240,10 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
         settings.camera = camera_settings(&renderer.scene().cameras, &by_itself.camera);
     }
     let camera = options_text(&settings);
-    let mut auto = asked.clone();
+    let mut auto = requested.clone();
     auto.integrators.ao.ao_radius = Some(Length::Auto);
     let auto_radius = renderer.complete(&auto, None)?.settings.integrators.ao.radius();
-    let lit = renderer.complete(&RenderSettings { integrator: Some("path".parse()?), ..asked.clone() }, None)?;
+    let lit = renderer.complete(&RenderSettings { integrator: Some("path".parse()?), ..requested.clone() }, None)?;
     let light = options_text(&RenderSettings { lighting: lit.chosen.lighting.clone(), ..Default::default() });
     progress.set(1, 4);
 

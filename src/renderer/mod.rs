@@ -223,8 +223,8 @@ impl Renderer {
         self.device.save_pipeline_cache();
     }
 
-    /// Gives the scene's file the meaning that settings say.
-    pub(crate) fn understand(&mut self, settings: &SceneSettings) {
+    /// Applies settings of what the scene's file leaves open. The traced scene is built anew if that changes it.
+    pub(crate) fn apply_scene_settings(&mut self, settings: &SceneSettings) {
         if settings.apply(&mut self.scene) {
             // the traced scene changes
             self.tracer = None;

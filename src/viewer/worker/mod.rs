@@ -271,7 +271,7 @@ impl Worker {
         let animations = open.renderer.scene().rig.as_ref().map_or(0, |rig| rig.animations().len());
         let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
-        open.renderer.understand(&first.meaning);
+        open.renderer.apply_scene_settings(&first.meaning);
         // the light may be a file that cannot be read: then there is the one before
         let (mut first, mut refused) = (first.clone(), None);
         let interactive = match open.renderer.interactive(&first.lighting, animation) {

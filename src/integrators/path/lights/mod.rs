@@ -1,7 +1,7 @@
 //! The lights of a scene as the path tracer samples them: [`LightRecord`]. They form two groups. Among *placed* lights, whose effect depends on the distance to
 //! them, a tree chooses by a bound of their contribution at a point ([`super::light_tree`]). *Distant* ones, the environment with its portals and directional
 //! lights, light all points alike and are chosen by the irradiance that they bring. Power decides nothing: that of what lights a whole scene grows with the
-//! scene, and a lamp beside it would get no samples where it is the brightest light there is.
+//! scene, and a light beside it would get no samples where it is the brightest there is.
 //!
 //! What is chosen by irradiance may be hidden where another light is not, so that each choice leaves a share to all: no light is sampled so rarely that few
 //! samples do not tell of it.
