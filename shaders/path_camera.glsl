@@ -55,7 +55,11 @@ void closest(uint index, Hit hit) {
     // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
-    if (WITH_MEDIA) state.medium = current_medium(path.camera_media);
+    if (WITH_MEDIA) {
+        state.medium = current_medium(path.camera_media);
+        // clipping planes hide surfaces, not what the camera is in
+        state.throughput *= transmittance(state.medium, clipped_length(p, r.direction));
+    }
     if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), path_sample(p, index), 1u);
     vec3 seen = path_vertex(p, k, state, r, hit);
     float covered = is_hit(hit) ? 1.0 : 0.0;

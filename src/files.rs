@@ -21,7 +21,7 @@ const START: u64 = 1024;
 /// [`Error::Input`] for a file that cannot be read, is empty, or holds something else in its place ([`placeholder`]).
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let bytes = read_regular(path).map_err(|e| Error::read(path, &e))?;
     match placeholder(&bytes) {
         Some(message) => Err(Error::input(path, message)),
         None => Ok(bytes),
@@ -34,7 +34,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
 /// [`Error::Input`] as [`read`] has it, and for bytes that are no UTF-8.
 pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     let path = path.as_ref();
-    let text = fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+    let text = read_regular_text(path).map_err(|e| Error::read(path, &e))?;
     match placeholder(text.as_bytes()).filter(|_| !text.is_empty()) {
         Some(message) => Err(Error::input(path, message)),
         None => Ok(text),
@@ -48,7 +48,7 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
 pub fn read_start(path: impl AsRef<Path>) -> Result<Vec<u8>> {
     let path = path.as_ref();
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(START).read_to_end(&mut start));
+    let read = open_regular(path).and_then(|file| file.take(START).read_to_end(&mut start));
     read.map_err(|e| Error::read(path, &e))?;
     match placeholder(&start) {
         Some(message) => Err(Error::input(path, message)),
@@ -121,6 +121,28 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
         (_, true) => Err(io::ErrorKind::IsADirectory.into()),
         _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),
     }
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// Those of [`open_regular`].
+pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let mut file = open_regular(path)?;
+    let length = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    // what cannot be had is an error of memory, and no panic
+    bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of a regular file.
+///
+/// # Errors
+/// Those of [`open_regular`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
+pub fn read_regular_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_regular(path)?).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.utf8_error()))
 }
 
 /// Whether a file belongs to this process's user or to root; true where files have no owners.
@@ -389,7 +411,11 @@ mod tests {
         for bytes in [&b"glTF"[..], b"{}", b"# version https://git-lfs", b"\n\n", b"<htm"] {
             assert_eq!(placeholder(bytes), None);
         }
-        assert_eq!(read_text(Path::new("/dev/null")).unwrap_or_default(), "");
+        // what never ends, or never answers, is no file to read
+        #[cfg(unix)]
+        for path in ["/dev/zero", "/dev/null"] {
+            assert!(read(path).unwrap_err().to_string().ends_with("not a regular file"), "{path}");
+        }
     }
 
     #[test]

@@ -450,7 +450,7 @@ fn decode(path: &Path) -> Result<Image> {
         e => Error::input(path, format!("not a readable EXR: {e}")),
     };
     files::read_start(path)?;
-    let open = || File::open(path).map_err(|e| Error::read(path, &e));
+    let open = || files::open_regular(path).map_err(|e| Error::read(path, &e));
     // the header first: it says how much memory the rest will take
     let meta = MetaData::read_from_unbuffered(open()?, false).map_err(broken)?;
     check_windows(&meta).map_err(|message| Error::input(path, message))?;

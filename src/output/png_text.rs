@@ -1,6 +1,5 @@
 //! Metadata of PNG files: text chunks (iTXt) called `skylit.KEY`, as attributes of an EXR are.
 
-use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 
@@ -45,7 +44,7 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
 /// [`Error::Input`].
 pub fn read_metadata(path: &Path) -> Result<Vec<(String, String)>> {
     files::read_start(path)?;
-    let file = File::open(path).map_err(|e| Error::read(path, &e))?;
+    let file = files::open_regular(path).map_err(|e| Error::read(path, &e))?;
     let broken = |e: &dyn std::fmt::Display| Error::input(path, format!("not a readable PNG: {e}"));
     let reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| broken(&e))?;
     let mut metadata = Vec::new();

@@ -532,8 +532,8 @@ impl Realtime {
         let (surfaces, others) = stages.split_at(usize::from(looks_first));
         let mut timings = Vec::new();
         if looks_first {
-            let control = control.as_mut().map(|c| &mut **c as &mut dyn Control);
-            timings = self.graph.run(&frame, surfaces, control)?;
+            let between_launches = control.as_mut().map(|c| &mut **c as &mut dyn Control);
+            timings = self.graph.run(&frame, surfaces, between_launches)?;
             let seen = match &mut self.seen {
                 Some(seen) => seen,
                 none => none.insert(SeenSurfaces::new(tracer)?),

@@ -113,7 +113,7 @@ fn config_folder() -> Option<PathBuf> {
 
 impl DefaultsFile {
     fn load_if_exists(path: &Path) -> Result<Option<Self>> {
-        match std::fs::read_to_string(path) {
+        match files::read_regular_text(path) {
             Ok(text) => Self::parse(path, &text).map(Some),
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
             Err(e) => Err(Error::read(path, &e)),

@@ -152,7 +152,7 @@ impl Manifest {
     /// [`Error::Input`], naming the line, for a file that cannot be read or is no manifest.
     pub fn load(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
-        let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
+        let text = crate::files::read_regular_text(&path).map_err(|e| match e.kind() {
             ErrorKind::NotFound => {
                 Error::input(&path, format!("no such file: it lists the frames, such as {EXAMPLE} (docs/ci.md)"))
             }

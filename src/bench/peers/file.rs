@@ -188,7 +188,7 @@ impl PeerSpec {
         (&self.build, &self.name).hash(&mut hash);
         for source in &self.sources {
             let path = self.folder.join(source);
-            std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
+            crate::files::read_regular(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
         }
         // a folder that others can write to holds no programs of ours
         let cache = crate::files::cache_folder().ok_or("there is no folder to build it in: set HOME or XDG_CACHE_HOME")?;

@@ -21,7 +21,7 @@ use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere
 
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
     let text = text::decode(&bytes);
     let wrong = |e: String| Error::input(path, text::shown(&e));
     let statements = parse::statements(&text).map_err(wrong)?;

@@ -159,7 +159,7 @@ pub(super) fn read_uri(uri: &str, gltf: &Path) -> Result<Vec<u8>, String> {
         Uri::Data(bytes) => Ok(bytes),
         Uri::Paths(paths) => {
             let file = uri::resolve(&paths, folder(gltf));
-            std::fs::read(&file).map_err(|e| match Error::read(&file, &e) {
+            crate::files::read_regular(&file).map_err(|e| match Error::read(&file, &e) {
                 Error::Input { path, message } => format!("{}: {message}", path.display()),
                 other => other.to_string(),
             })

@@ -66,7 +66,7 @@ fn text(name: &Option<String>) -> &str {
 
 /// Reads a `.gltf` or `.glb` file.
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let file = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let file = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
     let chunks = container::split(&file, path)?;
     let (document, doubles) = container::document(&chunks.json, path)?;
     let mut scene = Scene::default();

@@ -56,7 +56,7 @@ impl<'a> MaterialLibrary<'a> {
     /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`. What libraries before
     /// it have defined stays.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
-        let bytes = std::fs::read(mtl).map_err(|e| Error::read(mtl, &e))?;
+        let bytes = crate::files::read_regular(mtl).map_err(|e| Error::read(mtl, &e))?;
         if let Some(message) = crate::files::placeholder(&bytes).filter(|_| !bytes.is_empty()) {
             return Err(Error::input(mtl, message));
         }

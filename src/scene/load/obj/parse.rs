@@ -1,6 +1,5 @@
 //! The statements of an OBJ file.
 
-use std::fs::File;
 use std::path::Path;
 use std::str::SplitAsciiWhitespace;
 
@@ -52,7 +51,7 @@ pub(super) struct ObjFile {
 /// Parses a file; errors name the line.
 pub(super) fn parse(path: &Path) -> Result<ObjFile> {
     let unread = |e: std::io::Error| Error::read(path, &e);
-    let mut lines = Lines::new(File::open(path).map_err(unread)?).map_err(unread)?;
+    let mut lines = Lines::new(crate::files::open_regular(path).map_err(unread)?).map_err(unread)?;
     let mut parser = Parser::default();
     loop {
         let failed = match lines.next().map_err(unread)? {

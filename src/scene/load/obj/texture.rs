@@ -150,7 +150,7 @@ impl<'a> Textures<'a> {
         }
         report.files.push(path.to_owned());
         let picture = if self.options.textures {
-            let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e).to_string());
+            let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e).to_string());
             let name = path.to_string_lossy();
             let decoded = bytes.and_then(|b| picture::decode(&b, &name).map_err(|e| format!("{name} {e}")));
             (self.options.progress)(ImagesDecoded { done: self.pictures.len() + 1, of: None });
