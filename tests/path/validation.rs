@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::common::new_device;
-use glam::Affine2;
+use glam::{Affine2, Vec4};
 use skylit::accel::features::SceneFeatures;
 use skylit::integrators::ao::{Attenuation, Hemisphere};
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
@@ -50,8 +50,15 @@ fn everything() -> Scene {
     let sphere = Geometry::Spheres(vec![Sphere { center: Vec3::new(0.0, 2.0, -1.0), radius: 0.5 }]);
     let at = |y: f64| shapes::rectangle(DVec3::new(0.0, y, -0.5), DVec3::X, DVec3::Z);
     let triangle = scene.meshes[0].geometry.clone();
+    // textures of directions that lie differently on a surface
+    let mut turned = triangle.clone();
+    if let Geometry::Triangles(mesh) = &mut turned {
+        mesh.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); mesh.positions.len()];
+        mesh.clearcoat_tangents = vec![Vec4::new(0.0, 0.0, 1.0, -1.0); mesh.positions.len()];
+        mesh.anisotropy_tangents = mesh.clearcoat_tangents.clone();
+    }
     for (geometry, material) in [
-        (triangle.clone(), textured),
+        (turned, textured),
         (triangle.clone(), masked),
         (triangle.clone(), Material { transmission: body, roughness: 0.3, ..Material::default() }),
         (triangle.clone(), Material { unlit: true, ..Material::default() }),
@@ -158,6 +165,9 @@ fn gpu_kernels_of_all_features_are_valid() {
     // what excludes something of these, with as little else as there can be
     let little = scene_of(vec![(shapes::floor(DVec3::ZERO, 1.0), matte(0.5))], scene.cameras[0].clone());
     let little = Scene { environment: Environment::Uniform(Vec3::ONE), ..little };
+    // clear walls exclude a sample of each group of lights
+    let both = Scene { lights: vec![scene.lights[3].clone()], ..little.clone() };
+    holds(&tracers(&device), &both, all_needs, &base);
     for options in [
         PathOptions { strategy: Strategy::Light, ..base.clone() },
         PathOptions { strategy: Strategy::Cosine, ..base.clone() },
