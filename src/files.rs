@@ -106,6 +106,8 @@ fn target(path: &Path) -> io::Result<Target> {
 /// # Errors
 /// Those of the system, and [`io::ErrorKind::InvalidInput`] for what is no regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
+    #[cfg(feature = "probes")]
+    probes::wait(path);
     let mut options = OpenOptions::new();
     options.read(true);
     // a FIFO without a writer does not block
@@ -120,6 +122,27 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
         (true, _) => Ok(file),
         (_, true) => Err(io::ErrorKind::IsADirectory.into()),
         _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),
+    }
+}
+
+/// A file that does not open yet, as on a slow disk, for tests.
+#[cfg(feature = "probes")]
+pub mod probes {
+    use std::path::{Path, PathBuf};
+    use std::sync::{Condvar, Mutex, PoisonError};
+
+    static HELD: Mutex<Option<PathBuf>> = Mutex::new(None);
+    static CHANGED: Condvar = Condvar::new();
+
+    /// Who opens this path waits until another one is held, or none.
+    pub fn hold(path: Option<&Path>) {
+        *HELD.lock().unwrap_or_else(PoisonError::into_inner) = path.map(Path::to_owned);
+        CHANGED.notify_all();
+    }
+
+    pub(super) fn wait(path: &Path) {
+        let held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(CHANGED.wait_while(held, |held| held.as_deref() == Some(path)));
     }
 }
 
