@@ -89,6 +89,15 @@ impl Error {
         Error::Input { path: path.as_ref().to_owned(), message }
     }
 
+    /// Of this file, where the text does not say so already: for memory that ran out while it was read.
+    #[must_use]
+    pub fn of(self, path: impl AsRef<Path>) -> Self {
+        match self {
+            Error::OutOfMemory(message) => Error::OutOfMemory(format!("{}: {message}", path.as_ref().display())),
+            other => other,
+        }
+    }
+
     /// A file that could not be read, with the system's reason in plain words.
     pub fn read(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
         let message = match error.kind() {

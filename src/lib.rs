@@ -43,6 +43,7 @@ pub mod gpu;
 pub mod integrators;
 pub mod interface;
 pub mod measure;
+pub mod memory;
 pub mod oracle;
 pub mod output;
 pub mod raster;

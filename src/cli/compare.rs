@@ -18,6 +18,7 @@ use crate::integrators::IntegratorSettings;
 use crate::integrators::lighting::LightingSettings;
 use crate::measure::comparison::{CompareOptions, Comparison};
 use crate::measure::mask::MaskOptions;
+use crate::memory::Budget;
 use crate::output::{self, Image};
 use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::settings::{CameraSettings, ImageSettings};
@@ -280,7 +281,8 @@ fn entries(
 ) -> Result<Vec<Entry>> {
     let files: Vec<&Path> = sources.iter().filter_map(|s| if let Source::File(p) = s { Some(&**p) } else { None }).collect();
     // a file that is missing is noticed before anything is rendered
-    let loaded = files.iter().map(|p| output::load(p)).collect::<Result<Vec<_>>>()?;
+    let budget = Budget::default();
+    let loaded = files.iter().map(|p| output::load_within(p, &budget)).collect::<Result<Vec<_>>>()?;
     let mut loaded = loaded.into_iter().zip(files.iter().zip(short_names(&files)));
     let mut renderer = match (&args.scene, settings.is_empty()) {
         (Some(scene), false) => {

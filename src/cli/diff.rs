@@ -8,6 +8,7 @@ use crate::measure::comparison::{self, CompareOptions, Comparison};
 use crate::measure::flip::PIXELS_PER_DEGREE;
 use crate::measure::mask::MaskOptions;
 use crate::measure::metrics::ImagePair;
+use crate::memory::Budget;
 use crate::output::{self, Channel, Image, Samples};
 use crate::terminal::console::Failure;
 
@@ -39,7 +40,8 @@ struct Metrics {
 /// Compares and prints; fails if the limit is given and exceeded.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
-    let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
+    let budget = Budget::default();
+    let (a, b) = (output::load_within(&args.a, &budget)?, output::load_within(&args.b, &budget)?);
     comparison::check_size(&a, &b)?;
     let options = CompareOptions {
         channels: args.channels.clone(),

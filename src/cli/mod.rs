@@ -29,10 +29,12 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use bytesize::ByteSize;
 use clap::error::ErrorKind;
 use clap::{FromArgMatches, Parser};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::settings::parse::usage_message;
 use crate::terminal::console::{Failure, one_line};
 use crate::terminal::{console, interrupt, panic};
@@ -67,6 +69,9 @@ Examples:
 #[derive(Debug, Parser)]
 #[command(name = "skylit", version, about, before_help = EXAMPLES, after_help = EXIT_CODES)]
 struct Cli {
+    /// Memory that files loaded together may take, like 8GiB [default: half of this machine's, and 1 GiB and 256 bytes a byte read]
+    #[arg(long, global = true, value_name = "SIZE", hide_short_help = true, help_heading = "Files")]
+    memory_limit: Option<ByteSize>,
     #[command(subcommand)]
     command: Command,
 }
@@ -141,7 +146,10 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
         }
         let is_long_version = arguments.get(1).is_some_and(|a| a == "--version");
         match Cli::parse_from(with_view(arguments)) {
-            Ok(cli) => start_threads().map_err(Failure::from).and_then(|()| dispatch(cli.command, start)),
+            Ok(cli) => {
+                cli.memory_limit.into_iter().for_each(|limit| memory::set_limit(limit.as_u64()));
+                start_threads().map_err(Failure::from).and_then(|()| dispatch(cli.command, start))
+            }
             Err(e) if e.kind() == ErrorKind::DisplayVersion && is_long_version => Ok(console::print(&version::long())?),
             Err(e) => explain(&e).map_err(Failure::from),
         }

@@ -2,20 +2,24 @@
 
 use std::io::{Cursor, ErrorKind};
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+
+use crate::memory::Budget;
 
 /// What is said of a file that ends before its image does.
 pub(super) const ENDS_EARLY: &str = "ends early: it was cut off";
 
 /// Maximum size of a decoded image.
 #[derive(Clone, Copy, Debug)]
-pub struct MaxSize {
+pub struct MaxSize<'a> {
     /// Width and height.
     pub side: u32,
     /// Pixels of a decoded image for each byte of the file; `None` for any number. A file that promises more is broken, and believing it would only cost the memory.
     pub pixels_per_byte: Option<u64>,
-    /// Memory of the decoded image and its decoder, bytes.
-    pub memory: u64,
+    /// What the image is taken from.
+    pub budget: &'a Budget,
+    /// Bytes of a pixel of this kind: those that are kept, and those that are needed besides until they are made.
+    pub pixel_bytes: fn(ColorType) -> [u64; 2],
 }
 
 /// Decodes the bytes of an image file.
@@ -44,7 +48,8 @@ fn decode_as_is(bytes: &[u8], format: ImageFormat, max: MaxSize) -> Result<Dynam
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(max.side), Some(max.side));
-    limits.max_alloc = Some(max.memory);
+    // the budget says it better
+    limits.max_alloc = None;
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(wrong)?;
     let (width, height) = decoder.dimensions();
@@ -52,6 +57,8 @@ fn decode_as_is(bytes: &[u8], format: ImageFormat, max: MaxSize) -> Result<Dynam
     if pixels == 0 || max.pixels_per_byte.is_some_and(|most| pixels > most * bytes.len() as u64) {
         return Err(format!("cannot be decoded: {width}x{height} pixels from {} bytes", bytes.len()));
     }
+    let [kept, besides] = (max.pixel_bytes)(decoder.color_type()).map(|bytes| pixels * bytes);
+    max.budget.take_for_now(kept, besides, || format!("an image of {width}x{height} pixels"))?;
     DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 
@@ -124,9 +131,24 @@ impl JpegEnd {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{ENDS_EARLY, JpegEnd, MaxSize};
+    use crate::memory::Budget;
+    use image::{DynamicImage, ImageFormat};
+    use std::io::Cursor;
 
-    const MAX: MaxSize = MaxSize { side: 1 << 14, pixels_per_byte: None, memory: 1 << 30 };
+    fn decode(bytes: &[u8], format: ImageFormat) -> Result<DynamicImage, String> {
+        decode_within(bytes, format, &Budget::default(), |max| max)
+    }
+
+    fn decode_within(
+        bytes: &[u8],
+        format: ImageFormat,
+        budget: &Budget,
+        change: impl FnOnce(MaxSize<'_>) -> MaxSize<'_>,
+    ) -> Result<DynamicImage, String> {
+        let max = MaxSize { side: 1 << 14, pixels_per_byte: None, budget, pixel_bytes: |_| [4, 4] };
+        super::decode(bytes, format, change(max))
+    }
 
     fn encoded(format: ImageFormat) -> Vec<u8> {
         let image = image::RgbImage::from_fn(61, 43, |x, y| image::Rgb([(x * y) as u8, (x * 4) as u8, (y * 37 % 256) as u8]));
@@ -139,10 +161,10 @@ mod tests {
     fn files_that_end_early() {
         for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP, ImageFormat::Tga, ImageFormat::Bmp] {
             let bytes = encoded(format);
-            assert!(decode(&bytes, format, MAX).is_ok_and(|image| image.width() == 61), "{format:?}");
+            assert!(decode(&bytes, format).is_ok_and(|image| image.width() == 61), "{format:?}");
             for part in [0.1, 0.5, 0.9, 0.97] {
                 let cut = &bytes[..(bytes.len() as f64 * part) as usize];
-                assert_eq!(decode(cut, format, MAX).err().as_deref(), Some(ENDS_EARLY), "{format:?}, {part}");
+                assert_eq!(decode(cut, format).err().as_deref(), Some(ENDS_EARLY), "{format:?}, {part}");
             }
         }
     }
@@ -150,24 +172,31 @@ mod tests {
     #[test]
     fn a_jpeg_without_its_last_marker_is_whole() {
         let whole = encoded(ImageFormat::Jpeg);
-        let image = decode(&whole, ImageFormat::Jpeg, MAX).unwrap();
+        let image = decode(&whole, ImageFormat::Jpeg).unwrap();
         assert_eq!(JpegEnd::of(&whole), JpegEnd::Marked);
         // what others append to a file
         assert_eq!(JpegEnd::of(&[&whole[..], b"\0\0 and more"].concat()), JpegEnd::Marked);
         let without = &whole[..whole.len() - 2];
         assert_eq!(JpegEnd::of(without), JpegEnd::Missing { is_progressive: false });
-        assert_eq!(decode(without, ImageFormat::Jpeg, MAX).unwrap(), image);
+        assert_eq!(decode(without, ImageFormat::Jpeg).unwrap(), image);
         // zeros in place of what is missing
         let mut zeros = whole.clone();
         zeros[whole.len() / 2..].fill(0);
-        assert_eq!(decode(&zeros, ImageFormat::Jpeg, MAX).err().as_deref(), Some(ENDS_EARLY));
+        assert_eq!(decode(&zeros, ImageFormat::Jpeg).err().as_deref(), Some(ENDS_EARLY));
     }
 
     #[test]
     fn promises_of_a_header_are_not_believed() {
         let bytes = encoded(ImageFormat::Png);
-        let max = MaxSize { pixels_per_byte: Some(0), ..MAX };
-        assert!(decode(&bytes, ImageFormat::Png, max).unwrap_err().contains("61x43 pixels"));
-        assert!(decode(&bytes, ImageFormat::Png, MaxSize { side: 60, ..MAX }).is_err());
+        let of = |budget: &Budget, change: fn(MaxSize<'_>) -> MaxSize<'_>| {
+            decode_within(&bytes, ImageFormat::Png, budget, change).unwrap_err()
+        };
+        let few = of(&Budget::default(), |max| MaxSize { pixels_per_byte: Some(0), ..max });
+        assert!(few.contains("61x43 pixels"), "{few}");
+        of(&Budget::default(), |max| MaxSize { side: 60, ..max });
+        // before anything is decoded
+        let budget = Budget::of(61 * 43 * 8 - 1);
+        of(&budget, |max| max);
+        assert!(budget.check().unwrap_err().to_string().contains("an image of 61x43 pixels takes"));
     }
 }

@@ -26,6 +26,7 @@ use super::settings::{ExrCompression, FileSettings};
 use super::{Channel, Image, Samples, check_size};
 use crate::error::{Error, Result};
 use crate::files::{self, write_atomically};
+use crate::memory::Budget;
 
 /// First bytes of a file.
 pub const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -276,8 +277,17 @@ impl SamplesWriter for RowWriter<'_> {
 /// # Errors
 /// [`Error::Input`].
 pub fn read(path: &Path) -> Result<Image> {
+    read_within(path, &Budget::default())
+}
+
+/// As [`read`], with memory of a budget that images which are read together share.
+///
+/// # Errors
+/// [`Error::Input`], and [`Error::OutOfMemory`] for more than the budget has.
+pub fn read_within(path: &Path, budget: &Budget) -> Result<Image> {
     // the decoder panics at some files that are damaged
-    std::panic::catch_unwind(|| decode(path)).unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
+    std::panic::catch_unwind(|| decode(path, budget))
+        .unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
 }
 
 /// Bytes that a part's pixels take at least, whatever they are: a few damaged bytes of a header must not make the decoder take gigabytes. An entry of the table of blocks has 8 bytes, a
@@ -441,7 +451,7 @@ fn check_windows(meta: &MetaData) -> std::result::Result<(), String> {
     }
 }
 
-fn decode(path: &Path) -> Result<Image> {
+fn decode(path: &Path, budget: &Budget) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
         exr::error::Error::NotSupported(m) => Error::input(path, format!("an EXR of a kind that is not supported: {m}")),
@@ -457,6 +467,16 @@ fn decode(path: &Path) -> Result<Image> {
     let bytes = std::fs::metadata(path).map_err(|e| Error::read(path, &e))?.len();
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
         return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
+    }
+    budget.read(usize::try_from(bytes).unwrap_or(usize::MAX));
+    for header in &meta.headers {
+        let [data, display] = [header.data_window(), header.shared_attributes.display_window].map(|w| Window::from(w).pixels());
+        let bytes =
+            |pixels: u128| u64::try_from(pixels.saturating_mul(4 * header.channels.list.len() as u128)).unwrap_or(u64::MAX);
+        let size = Window::from(header.data_window()).size;
+        // as they are shown, and before that as they are read
+        let taken = budget.take_for_now(bytes(display), bytes(data), || format!("an image of {}x{} pixels", size.0, size.1));
+        taken.or_else(|_| budget.check().map_err(|e| e.of(path)))?;
     }
     if has_block_that_is_too_large(open()?, &meta).map_err(broken)? {
         return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));

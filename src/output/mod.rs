@@ -15,6 +15,7 @@ pub mod tone_map;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 use crate::settings::parse::Parsed;
 pub use picture::Picture;
 pub use settings::FileSettings;
@@ -162,9 +163,17 @@ pub fn save(image: &Image, path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Input`].
 pub fn load(path: &Path) -> Result<Image> {
+    load_within(path, &Budget::default())
+}
+
+/// As [`load`], with memory of a budget that images which are read together share.
+///
+/// # Errors
+/// Those of [`load`], and [`Error::OutOfMemory`] for more than the budget has.
+pub fn load_within(path: &Path, budget: &Budget) -> Result<Image> {
     match ImageFormat::of(path)? {
-        ImageFormat::Exr => exr::read(path),
-        _ => png::read(path),
+        ImageFormat::Exr => exr::read_within(path, budget),
+        _ => png::read(path, budget),
     }
 }
 

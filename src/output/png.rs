@@ -16,6 +16,7 @@ use super::{Channel, Image, ImageFormat, Samples, check_size};
 use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::memory::Budget;
 
 /// Metadata of images that were not read as linear values: how they were encoded.
 pub const ENCODING: &str = "encoding";
@@ -165,8 +166,8 @@ pub fn is_linear(bytes: &[u8]) -> bool {
 /// says that it is linear (gAMA 1). Alpha becomes the channel `A`, and the colours are associated with it, as those of EXR files are.
 ///
 /// # Errors
-/// [`Error::Input`], and [`Error::Usage`] for the name of another kind of file.
-pub fn read(path: &Path) -> Result<Image> {
+/// [`Error::Input`], [`Error::Usage`] for the name of another kind of file, and [`Error::OutOfMemory`] for more than the budget has.
+pub fn read(path: &Path, budget: &Budget) -> Result<Image> {
     let (name, format) = match ImageFormat::of(path)? {
         ImageFormat::Png => ("PNG", image::ImageFormat::Png),
         ImageFormat::Jpeg => ("JPEG", image::ImageFormat::Jpeg),
@@ -174,8 +175,16 @@ pub fn read(path: &Path) -> Result<Image> {
         ImageFormat::Exr => return Err(Error::Usage(format!("{}: not a picture", path.display()))),
     };
     let bytes = files::read(path)?;
-    let max = MaxSize { side: 1 << 20, pixels_per_byte: None, memory: super::MAX_PIXELS * 8 };
-    let decoded = decode(&bytes, format, max).map_err(|e| Error::input(path, format!("not a readable {name}: {e}")))?;
+    budget.read(bytes.len());
+    // channels; and before them pixels as decoded and as floats
+    let pixel_bytes = |c: image::ColorType| {
+        let channels = 4 * u64::from(c.channel_count());
+        [channels, u64::from(c.bytes_per_pixel()) + channels]
+    };
+    let max = MaxSize { side: 1 << 20, pixels_per_byte: None, budget, pixel_bytes };
+    let decoded = decode(&bytes, format, max);
+    budget.check().map_err(|e| e.of(path))?;
+    let decoded = decoded.map_err(|e| Error::input(path, format!("not a readable {name}: {e}")))?;
     let is_linear = format == image::ImageFormat::Png && is_linear(&bytes);
     let (width, height) = (decoded.width(), decoded.height());
     check_size(width, height).map_err(|e| Error::input(path, e.to_string()))?;

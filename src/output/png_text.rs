@@ -72,7 +72,7 @@ mod tests {
         let image = Image { width: 2, height: 2, channels: vec![plane("B", 0.1), plane("G", 0.7), plane("R", 0.2)], metadata };
         write(&image, &path).unwrap();
         assert_eq!(read_metadata(&path).unwrap(), image.metadata);
-        let back = png::read(&path).unwrap();
+        let back = png::read(&path, &crate::memory::Budget::default()).unwrap();
         assert_eq!(bytes_of(&back, 0.0, &path).unwrap(), bytes_of(&image, 0.0, &path).unwrap());
         // one without metadata
         png::write(&image, &path, 0.0).unwrap();

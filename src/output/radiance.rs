@@ -8,6 +8,7 @@ use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 
 use super::decode::ENDS_EARLY;
+use crate::memory::Budget;
 
 /// Longest header, bytes: commands that made an image may be listed in it.
 const MAX_HEADER: usize = 1 << 16;
@@ -56,7 +57,7 @@ struct Resolution {
 ///
 /// # Errors
 /// What is wrong with the file, as the end of a sentence.
-pub fn decode(mut bytes: Vec<u8>, max_side: u32) -> Result<RadianceImage, String> {
+pub fn decode(mut bytes: Vec<u8>, max_side: u32, budget: &Budget) -> Result<RadianceImage, String> {
     let Header { length, factors, resolution } = Header::parse(&bytes)?;
     let (lines, pixels) = (resolution.scan_lines, resolution.length);
     if lines == 0 || pixels == 0 || lines > max_side || pixels > max_side {
@@ -66,6 +67,10 @@ pub fn decode(mut bytes: Vec<u8>, max_side: u32) -> Result<RadianceImage, String
     if u64::from(lines) * 4 > (bytes.len() - length) as u64 {
         return Err(ENDS_EARLY.to_owned());
     }
+    let size = || format!("an image of {pixels}x{lines} pixels");
+    // once as it is read and once as it is turned
+    let image = u64::from(lines) * u64::from(pixels) * 12;
+    budget.take_for_now(image, image, size)?;
 
     // the header that the decoder knows
     bytes.splice(..length, format!("#?RADIANCE\n\n-Y {lines} +X {pixels}\n").into_bytes());
@@ -188,6 +193,10 @@ impl Resolution {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn decode(bytes: Vec<u8>, max_side: u32) -> Result<RadianceImage, String> {
+        super::decode(bytes, max_side, &Budget::default())
+    }
 
     /// An image of 3 x 2 pixels whose red says where they are: 0, 1, 2 in the upper row.
     fn file(signature: &str, header: &str, size: &str, order: [u8; 6]) -> Vec<u8> {

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
 use crate::film::Control;
+use crate::scene::load;
 
 use crate::terminal::progress::Progress;
 
@@ -17,7 +18,12 @@ pub fn install() {
     INSTALL.call_once(|| {
         // a failure leaves the system's own behaviour, which is good enough
         let _ = ctrlc::set_handler(|| {
-            if REQUESTED.swap(true, Ordering::Relaxed) {
+            // loading asks nobody, and leaves nothing behind
+            let is_loading = load::is_in_progress();
+            if is_loading {
+                super::console::error(&Error::Interrupted.to_string());
+            }
+            if REQUESTED.swap(true, Ordering::Relaxed) || is_loading {
                 std::process::exit(i32::from(Error::Interrupted.exit_code()));
             }
         });

@@ -734,3 +734,58 @@ fn gpu_clocks_that_jump() {
     let path: PathBuf = exr("b.exr").into();
     assert!(path.exists());
 }
+
+/// What files may take of the memory is an option, for scenes, their environments and images that are compared. Beyond it ends with one line, before anything is written.
+#[test]
+fn files_take_as_much_memory_as_they_may() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| place(&dir, name);
+    let channel = |name: &str| Channel { name: name.into(), samples: Samples::F32(vec![0.5; 512 * 256]) };
+    let image = Image { width: 512, height: 256, channels: ["R", "G", "B"].map(channel).to_vec(), metadata: Vec::new() };
+    for name in ["a.png", "a.exr"] {
+        output::save(&image, Path::new(&at(name))).unwrap();
+    }
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/courtyard.gltf");
+    let (scene, before) = (scene.to_string_lossy(), names(dir.path()));
+    let (png, exr) = (at("a.png"), at("a.exr"));
+    let commands: [&[&str]; 5] = [
+        &["info", &scene, "--no-device"],
+        &["export", &scene, &at("b.glb")],
+        &["diff", &png, &png],
+        &["diff", &exr, &exr],
+        &["compare", &png, &exr],
+    ];
+    for command in commands {
+        let out = run(&[command, &["--memory-limit", "4KiB"][..]].concat());
+        ends(&out, 5, "takes");
+        assert!(stderr(&out).contains("more than the 4.0 KiB that files loaded together may take"), "{}", stderr(&out));
+        assert_eq!(names(dir.path()), before, "{command:?}");
+    }
+    for command in [commands[0], commands[2], commands[3]] {
+        assert!(run(&[&["--memory-limit", "100MB"][..], command].concat()).status.success(), "{command:?}");
+    }
+    for size in ["lots", "-1", ""] {
+        ends(&run(&["info", &scene, &format!("--memory-limit={size}")]), 64, "--memory-limit");
+    }
+}
+
+/// Ctrl-C ends a load at once, whatever the format.
+#[test]
+fn loading_is_interrupted_at_once() {
+    use std::io::Write;
+    let dir = tempfile::tempdir().unwrap();
+    let path = place(&dir, "large.obj");
+    let mut file = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
+    for k in 0..4_000_000 {
+        writeln!(file, "v {} {} {}\nf {} {} {}", k % 1009, k % 997, k % 991, k + 1, k / 2 + 1, k / 3 + 1).unwrap();
+    }
+    drop(file);
+    let mut program = skylit(&["info", &path, "--no-device"]);
+    let child = program.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    let start = Instant::now();
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let out = child.wait_with_output().unwrap();
+    ends(&out, 130, "interrupted");
+    assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+}

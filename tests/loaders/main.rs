@@ -12,6 +12,7 @@ mod fuzz;
 mod geometry;
 mod hierarchy;
 mod materials;
+mod memory;
 mod obj;
 mod own;
 mod shared;

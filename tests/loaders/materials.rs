@@ -240,3 +240,62 @@ fn missing_and_broken_images_are_left_out() {
     assert_eq!(scene.report.warnings.len(), 3, "{:?}", scene.report.warnings);
     assert!(scene.report.warnings[0].contains("gone.png"), "{:?}", scene.report.warnings);
 }
+
+/// Numbers that no material has, in every format: light is not negative, nothing reflects more than there is, and all is finite.
+#[test]
+fn numbers_out_of_range() {
+    let is_possible = |scene: &Scene, from: &str| {
+        for m in &scene.materials {
+            let shares =
+                [m.base_color.truncate(), m.sheen.color, m.transmittance, m.transmission.attenuation_color, m.specular_color];
+            assert!(shares.iter().all(|c| c.min_element() >= 0.0 && c.max_element() <= 1.0), "{from}: {m:?}");
+            assert!([m.emissive, m.specular.color].iter().all(|c| c.min_element() >= 0.0 && c.is_finite()), "{from}: {m:?}");
+            let shares =
+                [m.metallic, m.roughness, m.clearcoat.factor, m.clearcoat.roughness, m.sheen.roughness, m.specular.factor];
+            assert!(shares.iter().chain([&m.anisotropy.strength]).all(|v| (0.0..=1.0).contains(v)), "{from}: {m:?}");
+            assert!(m.normal_scale.is_finite() && m.ior.is_finite() && m.anisotropy.rotation.is_finite(), "{from}: {m:?}");
+        }
+        assert!(scene.lights.iter().all(|l| l.intensity.min_element() >= 0.0), "{from}");
+        assert!(
+            scene.report.warnings.iter().any(|w| w.contains("instead") || w.contains("ignored")),
+            "{from}: {:?}",
+            scene.report.warnings
+        );
+    };
+    for value in [-1.0, -1e308, 1e308, 1e25, -1e-2] {
+        let colour = [value; 3];
+        let mut doc = with_material(json!({
+            "emissiveFactor": colour,
+            "pbrMetallicRoughness": { "baseColorFactor": [value, value, value, value], "metallicFactor": value, "roughnessFactor": value },
+            "normalTexture": { "index": 0, "scale": value },
+            "extensions": {
+                "KHR_materials_specular": { "specularColorFactor": colour, "specularFactor": value },
+                "KHR_materials_sheen": { "sheenColorFactor": colour, "sheenRoughnessFactor": value },
+                "KHR_materials_clearcoat": { "clearcoatFactor": value, "clearcoatRoughnessFactor": value },
+                "KHR_materials_anisotropy": { "anisotropyStrength": value, "anisotropyRotation": value },
+                "KHR_materials_volume": { "attenuationColor": colour, "thicknessFactor": value, "attenuationDistance": value },
+                "KHR_materials_ior": { "ior": value },
+                "KHR_materials_emissive_strength": { "emissiveStrength": value },
+            },
+        }));
+        let color = doc.accessor(&bytes(&[[value as f32; 4]; 3]), F32, "VEC4", 3);
+        doc.first()["attributes"]["COLOR_0"] = json!(color);
+        let scene = doc.load();
+        is_possible(&scene, &format!("glTF, {value}"));
+        let colors = &mesh(&scene, 0).colors;
+        assert!(colors.iter().all(|c| c.min_element() >= 0.0 && c.max_element() <= 1.0), "{value}: {colors:?}");
+
+        let folder = Folder::new();
+        let numbers = format!("{value} {value} {value}");
+        let library = format!(
+            "newmtl m\nKd {numbers}\nKs {numbers}\nKe {numbers}\nTf {numbers}\nNi 1.5\nillum 7\nPr {value}\nPm {value}\nd {value}\n"
+        );
+        folder.write("m.mtl", library);
+        let scene = folder.load("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n").unwrap();
+        is_possible(&scene, &format!("MTL, {value}"));
+
+        let sphere = "Sphere center[0 0 0] radius[1] material[matte]";
+        let scene = folder.load("s.brhan", format!("{sphere} diffuse[{numbers}]\n")).unwrap();
+        is_possible(&scene, &format!(".brhan, {value}"));
+    }
+}

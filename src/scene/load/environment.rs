@@ -11,11 +11,14 @@ use rayon::prelude::*;
 use super::picture;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::memory::Budget;
 use crate::output::{Image, exr, png, radiance};
 use crate::scene::EnvironmentMap;
 
 /// Largest width and height.
 const MAX_SIDE: u32 = 16384;
+/// Bytes of a pixel on the device and in the tables for sampling it.
+const DEVICE_BYTES: u64 = 28;
 /// Radiance that stands in for infinity: the largest value of a 16-bit float, beyond which files have infinity.
 const INFINITE_RADIANCE: f32 = 65504.0;
 
@@ -44,7 +47,10 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
 /// # Errors
 /// Those of [`load_environment`].
 pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Result<EnvironmentMap> {
-    let Pixels { width, height, radiance, warning } = if path.is_dir() { cube::read(path)? } else { read(path)? };
+    let _in_progress = super::InProgress::begin();
+    let budget = Budget::default();
+    let Pixels { width, height, radiance, warning } =
+        if path.is_dir() { cube::read(path, &budget)? } else { read(path, &budget)? };
     warning.into_iter().for_each(warn);
     Ok(EnvironmentMap {
         name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -57,21 +63,25 @@ pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Resul
 }
 
 /// One image, of the kind that its first bytes show.
-fn read(path: &Path) -> Result<Pixels> {
+fn read(path: &Path, budget: &Budget) -> Result<Pixels> {
     let start = files::read_start(path)?;
     let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     let mut pixels = if start.starts_with(&exr::MAGIC) || is("exr") {
-        read_exr(path)?
+        read_exr(path, budget)?
     } else if image::guess_format(&start).is_ok_and(|format| format != image::ImageFormat::Hdr) {
-        read_picture(path)?
+        read_picture(path, budget)?
     } else if radiance::is_radiance(&start) || ["hdr", "pic", "rgbe"].into_iter().any(is) {
-        read_hdr(path)?
+        read_hdr(path, budget)?
     } else {
         return Err(Error::input(
             path,
             "is not an environment: .hdr, .exr, .png, .jpg, .webp and folders of a cube's faces are",
         ));
     };
+    // texels on the device, and the table by which they are sampled
+    let pixel_count = u64::from(pixels.width) * u64::from(pixels.height);
+    let what = || format!("an environment of {}x{} pixels", pixels.width, pixels.height);
+    budget.take(pixel_count * DEVICE_BYTES, what).or_else(|_| budget.check().map_err(|e| e.of(path)))?;
     if let Some(replaced) = Replaced::count(&pixels.radiance) {
         pixels.radiance = pixels.radiance.iter().map(|c| Vec3::from_array(c.to_array().map(admissible))).collect();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -126,16 +136,23 @@ impl Replaced {
     }
 }
 
-fn read_hdr(path: &Path) -> Result<Pixels> {
-    let image = radiance::decode(files::read(path)?, MAX_SIDE).map_err(|e| Error::input(path, e))?;
+fn read_hdr(path: &Path, budget: &Budget) -> Result<Pixels> {
+    let bytes = files::read(path)?;
+    budget.read(bytes.len());
+    let image = radiance::decode(bytes, MAX_SIDE, budget);
+    budget.check().map_err(|e| e.of(path))?;
+    let image = image.map_err(|e| Error::input(path, e))?;
     let radiance = image.rgb.into_iter().map(Vec3::from_array).collect();
     Ok(Pixels { width: image.width, height: image.height, radiance, warning: None })
 }
 
 /// A picture of 8 or 16 bits, whose values are decoded; its alpha is ignored.
-fn read_picture(path: &Path) -> Result<Pixels> {
+fn read_picture(path: &Path, budget: &Budget) -> Result<Pixels> {
     let bytes = files::read(path)?;
-    let p = picture::decode(&bytes, &path.to_string_lossy()).map_err(|e| Error::input(path, e))?;
+    budget.read(bytes.len());
+    let p = picture::decode(&bytes, &path.to_string_lossy(), budget);
+    budget.check().map_err(|e| e.of(path))?;
+    let p = p.map_err(|e| Error::input(path, e))?;
     let is_linear = png::is_linear(&bytes[..]);
     let linear = |i| {
         let [r, g, b, _] = if is_linear { p.texels.get(i) } else { p.texels.decode_srgb(i) };
@@ -145,8 +162,8 @@ fn read_picture(path: &Path) -> Result<Pixels> {
     Ok(Pixels { width: p.width, height: p.height, radiance, warning: None })
 }
 
-fn read_exr(path: &Path) -> Result<Pixels> {
-    let image = exr::read(path)?;
+fn read_exr(path: &Path, budget: &Budget) -> Result<Pixels> {
+    let image = exr::read_within(path, budget)?;
     if image.width > MAX_SIDE || image.height > MAX_SIDE {
         return Err(Error::input(path, format!("is larger than {MAX_SIDE} pixels")));
     }

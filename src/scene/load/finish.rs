@@ -5,10 +5,10 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::{normals, tangents};
+use super::{normals, ranges, tangents};
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 use crate::scene::animation::Deformation;
-use crate::scene::material::MaterialKind;
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
@@ -22,13 +22,15 @@ const MIN_EXTENT: f64 = 1e-12;
 const MAX_INVERSE: f64 = 1e30;
 
 /// Checks and repairs `scene`, which was read from `path`.
-pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
+pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<()> {
     check(scene, path)?;
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
     }
-    materials(scene);
-    bake_singular(scene);
+    ranges::apply(scene);
+    texture_slots(scene);
+    bake_singular(scene, budget);
+    budget.check().map_err(|e| e.of(path))?;
     drop_unplaced(scene);
 
     let materials = &scene.materials;
@@ -90,27 +92,9 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
     Ok(())
 }
 
-/// Clamps material parameters to the ranges that [`Material`] documents, where rendering depends on them.
-fn materials(scene: &mut Scene) {
+/// Texture slots: transforms that are finite, and coordinates that are kept.
+fn texture_slots(scene: &mut Scene) {
     for material in &mut scene.materials {
-        if !material.base_color.is_finite() || !material.emissive.is_finite() {
-            let name = &material.name;
-            scene.report.warnings.push(format!("material `{name}` has a colour that is not finite: replaced"));
-            material.base_color = glam::Vec4::ONE;
-            material.emissive = glam::Vec3::ZERO;
-        }
-        // 0 is glTF's word for a Fresnel term of 1
-        if !(material.ior >= 1.0 || material.ior == 0.0 && material.kind == MaterialKind::MetallicRoughness) {
-            let (name, ior) = (&material.name, material.ior);
-            scene
-                .report
-                .warnings
-                .push(format!("material `{name}` has an index of refraction of {ior}, which is below 1: 1 instead"));
-            material.ior = 1.0;
-        }
-        for share in [&mut material.metallic, &mut material.roughness, &mut material.occlusion_strength] {
-            *share = share.clamp(0.0, 1.0);
-        }
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| !s.transform.is_finite()) {
             slot.transform = glam::Affine2::IDENTITY;
         }
@@ -122,10 +106,18 @@ fn materials(scene: &mut Scene) {
     }
 }
 
+/// Bytes of a mesh in host memory, at most.
+fn host_bytes(mesh: &Mesh) -> u64 {
+    match &mesh.geometry {
+        Geometry::Triangles(t) => 12 * t.indices.len() as u64 + 80 * t.positions.len() as u64,
+        Geometry::Spheres(spheres) => size_of_val(&spheres[..]) as u64,
+    }
+}
+
 /// Handles singular transforms, because tracers invert transforms. A mesh that is scaled to a plane is baked: the transform is applied to
 /// its vertices. An instance that is scaled to a line or a point, which is a way of hiding it, is dropped. Animated instances may grow
 /// again, and deforming meshes cannot be baked: both get a minimum scale instead ([`AnimationRig::apply_rest_pose`]).
-fn bake_singular(scene: &mut Scene) {
+fn bake_singular(scene: &mut Scene, budget: &Budget) {
     let before = scene.instances.len();
     let moving = scene.rig.as_ref().map(|rig| rig.moving(scene));
     let moves = |i: usize| moving.as_ref().is_some_and(|m| m[i]);
@@ -152,6 +144,9 @@ fn bake_singular(scene: &mut Scene) {
             continue;
         }
         let source = &scene.meshes[instance.mesh];
+        if budget.take(host_bytes(source), || format!("the mesh `{}`, which is scaled to a plane,", source.name)).is_err() {
+            return;
+        }
         let geometry = match &source.geometry {
             Geometry::Triangles(t) => {
                 let place = |p: &glam::Vec3| instance.object_to_world.transform_point3(p.as_dvec3()).as_vec3();

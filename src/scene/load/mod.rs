@@ -10,16 +10,19 @@ mod gltf;
 mod normals;
 mod obj;
 mod picture;
+mod ranges;
 mod tangents;
 mod text;
 mod warnings;
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 pub use camera_path::load_camera_path;
 pub use environment::{load_environment, load_environment_with};
 
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 use crate::scene::{Scene, builtin};
 
 /// How a scene is loaded.
@@ -99,20 +102,56 @@ pub fn load_file(path: &Path) -> Result<Scene> {
     load_file_with(path, &LoadOptions::default())
 }
 
+/// What all readers of a scene and its files have in common.
+#[derive(Clone, Copy)]
+struct Loading<'a> {
+    options: LoadOptions<'a>,
+    budget: &'a Budget,
+}
+
+/// Number of files that are being loaded.
+static IN_PROGRESS: AtomicUsize = AtomicUsize::new(0);
+
+/// Whether a scene or an environment is being loaded, in any thread. A load does not ask whether it is to stop: it writes nothing, and whoever wants to stop may end the process.
+pub fn is_in_progress() -> bool {
+    IN_PROGRESS.load(Ordering::Relaxed) > 0
+}
+
+/// A load, while it lasts.
+struct InProgress;
+
+impl InProgress {
+    fn begin() -> Self {
+        IN_PROGRESS.fetch_add(1, Ordering::Relaxed);
+        Self
+    }
+}
+
+impl Drop for InProgress {
+    fn drop(&mut self) {
+        IN_PROGRESS.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let mut scene = read(path, options)?;
+    let _in_progress = InProgress::begin();
+    let budget = Budget::default();
+    let outcome = read(path, Loading { options: *options, budget: &budget });
+    // for which readers have other errors, or warnings
+    budget.check().map_err(|e| e.of(path))?;
+    let mut scene = outcome?;
     scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    finish::finish(&mut scene, path)?;
+    finish::finish(&mut scene, path, &budget)?;
     scene.report.warnings = warnings::bounded(std::mem::take(&mut scene.report.warnings));
     Ok(scene)
 }
 
 /// Reads any format, without [`finish`].
-fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+fn read(path: &Path, loading: Loading) -> Result<Scene> {
     match extension(path).as_str() {
-        "brhan" => check_start(path).and_then(|()| brhan::read(path, options)),
-        _ => read_model(path, options),
+        "brhan" => check_start(path).and_then(|()| brhan::read(path, loading)),
+        _ => read_model(path, loading),
     }
 }
 
@@ -127,10 +166,10 @@ fn check_start(path: &Path) -> Result<()> {
 }
 
 /// Reads the formats that hold models and may be named by another file, without [`finish`].
-fn read_model(path: &Path, options: &LoadOptions) -> Result<Scene> {
+fn read_model(path: &Path, loading: Loading) -> Result<Scene> {
     match extension(path).as_str() {
-        "gltf" | "glb" => check_start(path).and_then(|()| gltf::read(path, options)),
-        "obj" => check_start(path).and_then(|()| obj::read(path, options)),
+        "gltf" | "glb" => check_start(path).and_then(|()| gltf::read(path, loading)),
+        "obj" => check_start(path).and_then(|()| obj::read(path, loading)),
         "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
         "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
         other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),

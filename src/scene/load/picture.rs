@@ -3,6 +3,7 @@
 use image::{ColorType, ImageFormat};
 
 use crate::files::placeholder;
+use crate::memory::Budget;
 use crate::output::decode::{self, MaxSize};
 use crate::output::radiance::{self, RadianceImage};
 use crate::scene::TexelData;
@@ -18,16 +19,23 @@ pub(super) struct DecodedImage {
     pub texels: TexelData,
 }
 
+/// Bytes of a texel of this kind, and of what it is made of: the decoder's pixel, and four channels before they are shared.
+fn texel_bytes(color: ColorType) -> [u64; 2] {
+    let pixel = u64::from(color.bytes_per_pixel());
+    let texel = 4 * pixel / u64::from(color.channel_count().max(1));
+    [texel, pixel + texel]
+}
+
 /// Decodes an image of the format that its first bytes show or, for formats without a signature (TGA), that `name` ends in.
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn decode(bytes: &[u8], name: &str) -> Result<DecodedImage, String> {
+pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<DecodedImage, String> {
     if let Some(message) = placeholder(bytes) {
         return Err(message.to_owned());
     }
     if radiance::is_radiance(bytes) {
-        let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE)?;
+        let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE, budget)?;
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
         let texels = rgb.into_iter().flat_map(|[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect::<Vec<f32>>().into();
         return Ok(DecodedImage { width, height, texels });
@@ -36,7 +44,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<DecodedImage, String> {
         .or_else(|_| ImageFormat::from_path(name))
         .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, WebP, TGA and BMP are)".to_owned())?;
     // a one-bit PNG packs at most 8 * 1032 pixels into a byte, every other format fewer
-    let max = MaxSize { side: MAX_SIDE, pixels_per_byte: Some(10_000), memory: 2 << 30 };
+    let max = MaxSize { side: MAX_SIDE, pixels_per_byte: Some(10_000), budget, pixel_bytes: texel_bytes };
     let pixels = decode::decode(bytes, format, max)?;
     let (width, height) = (pixels.width(), pixels.height());
     let texels = match pixels.color() {

@@ -14,19 +14,20 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use parse::Statement;
 
 use super::find::Finder;
-use super::{LoadOptions, find, finish, text};
+use super::{Loading, find, finish, text};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
 use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
-pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
+    loading.budget.read(bytes.len());
     let text = text::decode(&bytes);
     let wrong = |e: String| Error::input(path, text::shown(&e));
     let statements = parse::statements(&text).map_err(wrong)?;
     let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::default());
-    let mut loader = Loader { path, options, scene, models, finder };
+    let mut loader = Loader { path, loading, scene, models, finder };
     for mut statement in statements {
         loader.statement(&mut statement)?;
         statement.done().map_err(wrong)?;
@@ -36,7 +37,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
 
 struct Loader<'a> {
     path: &'a Path,
-    options: &'a LoadOptions<'a>,
+    loading: Loading<'a>,
     scene: Scene,
     /// The instances of each loaded model with each material, relative to the model.
     models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
@@ -140,7 +141,7 @@ impl Loader<'_> {
         // a model that is used twice with one material is read once
         let key = (found, material.as_ref().map(|m| format!("{m:?}")));
         if !self.models.contains_key(&key) {
-            let mut model = super::read_model(&key.0, self.options)?;
+            let mut model = super::read_model(&key.0, self.loading)?;
             if model.rig.is_some() {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::{MAX_SIDE, Pixels};
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 
 /// File names of the faces, without extension: the axes through their centres.
 const FACES: [&str; 6] = ["px", "nx", "py", "ny", "pz", "nz"];
@@ -16,8 +17,8 @@ const EXTENSIONS: [&str; 6] = ["hdr", "exr", "png", "jpg", "jpeg", "webp"];
 const POINTS: u32 = 3;
 
 /// Reads the faces that lie in a folder; a texel of the result is about as large as one of theirs.
-pub(super) fn read(folder: &Path) -> Result<Pixels> {
-    let faces = FACES.map(|name| face(folder, name));
+pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Pixels> {
+    let faces = FACES.map(|name| face(folder, name, budget));
     let faces: Vec<Pixels> = faces.into_iter().collect::<Result<_>>()?;
     let side = faces[0].width;
     if let Some(k) = faces.iter().position(|f| f.width != side || f.height != side) {
@@ -33,13 +34,13 @@ pub(super) fn read(folder: &Path) -> Result<Pixels> {
     Ok(Pixels { width, height, radiance, warning: (!warnings.is_empty()).then(|| warnings.join("; ")) })
 }
 
-fn face(folder: &Path, name: &str) -> Result<Pixels> {
+fn face(folder: &Path, name: &str, budget: &Budget) -> Result<Pixels> {
     let candidates = EXTENSIONS.map(|e| folder.join(name).with_extension(e));
     let Some(path) = candidates.iter().find(|p| p.is_file()) else {
         let all = FACES.join(", ");
         return Err(Error::input(folder, format!("has no face {name} (.hdr, .exr, .png, .jpg, .webp): a cube has {all}")));
     };
-    super::read(path)
+    super::read(path, budget)
 }
 
 fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {

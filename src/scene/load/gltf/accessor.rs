@@ -5,14 +5,14 @@ use ::gltf::json::{Index, Root, buffer};
 
 use super::container::BufferBytes;
 use super::valid;
-
-/// Elements that an accessor without data (all zeros, or sparse over zeros) may have; nothing in the file bounds them.
-const MAX_EMPTY: u64 = 1 << 24;
+use crate::memory::Budget;
 
 /// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
 pub(super) struct Reader<'a> {
     pub document: &'a Root,
     pub buffers: &'a [BufferBytes<'a>],
+    /// What arrays are taken from.
+    pub budget: &'a Budget,
 }
 
 /// Reads one component of an element.
@@ -175,14 +175,17 @@ impl<'a> Reader<'a> {
 
     fn try_floats<const N: usize, T>(&self, accessor: &Accessor, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, String> {
         let component = self.component(accessor)?;
+        let bytes = accessor.count.0.saturating_mul(size_of::<T>() as u64);
+        let make_room = || self.take(bytes, accessor.count.0);
         let mut out = match accessor.buffer_view {
             Some(view) => {
                 let elements =
                     self.elements(view, accessor.byte_offset.unwrap_or_default().0, accessor.count.0, N * component.size())?;
+                make_room()?;
                 gather(&elements, accessor.count.0 as usize, component, accessor.normalized, &make)
             }
             None => {
-                check_empty(accessor)?;
+                make_room()?;
                 (0..accessor.count.0).map(|_| make([0.0; N])).collect()
             }
         };
@@ -213,16 +216,22 @@ impl<'a> Reader<'a> {
                 Indices::InPlace { bytes, count: accessor.count.0 as usize, stride, size: component.size() }
             }
             None => {
-                check_empty(accessor)?;
+                self.take(accessor.count.0.saturating_mul(4), accessor.count.0)?;
                 Indices::Owned(vec![0; accessor.count.0 as usize])
             }
         };
         let Some((at, values)) = self.sparse(accessor, component.size())? else { return Ok(base) };
+        self.take(accessor.count.0.saturating_mul(4), accessor.count.0)?;
         let mut all: Vec<u32> = (0..base.len()).map(|i| base.get(i)).collect();
         for (k, i) in at.into_iter().enumerate() {
             all[i] = component.index(&values.bytes[k * values.stride..]);
         }
         Ok(Indices::Owned(all))
+    }
+
+    /// Makes room for what is read of an accessor. Nothing in the file bounds those without data, which are all zeros, and several uses of one have a copy each.
+    fn take(&self, bytes: u64, count: u64) -> Result<(), String> {
+        self.budget.take(bytes, || format!("an accessor of {count} elements"))
     }
 
     fn component(&self, accessor: &Accessor) -> Result<ComponentType, String> {
@@ -247,14 +256,6 @@ impl<'a> Reader<'a> {
 /// The type as glTF writes it.
 fn name(shape: Type) -> String {
     format!("{shape:?}").to_uppercase()
-}
-
-/// Refuses counts that nothing in the file bounds and that would only fill memory with zeros.
-fn check_empty(accessor: &Accessor) -> Result<(), String> {
-    match accessor.count.0 > MAX_EMPTY {
-        true => Err(format!("has {} elements but no data", accessor.count.0)),
-        false => Ok(()),
-    }
 }
 
 fn gather<const N: usize, T>(

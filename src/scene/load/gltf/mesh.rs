@@ -74,6 +74,7 @@ pub(super) fn read(
     mesh.indices = match primitive.indices {
         Some(accessor) => {
             let indices = reader.indices(accessor)?;
+            reader.budget.take(12 * indices.len() as u64, || format!("a mesh of {} corners", indices.len()))?;
             // one call site per storage, so that the common one compiles to a plain loop
             match &indices {
                 Indices::Owned(v) => triangles(mode, v.len(), |i| v[i]),

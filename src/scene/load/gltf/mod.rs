@@ -29,7 +29,7 @@ use accessor::Reader;
 use glam::{DAffine3, DVec3};
 use rig::{MeshVariant, RigBuilder};
 
-use super::{LoadOptions, compact};
+use super::{Loading, compact};
 use crate::error::{Error, Result};
 use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
 
@@ -65,14 +65,16 @@ fn text(name: &Option<String>) -> &str {
 }
 
 /// Reads a `.gltf` or `.glb` file.
-pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let file = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
+    let budget = loading.budget;
+    budget.read(file.len());
     let chunks = container::split(&file, path)?;
     let (document, doubles) = container::document(&chunks.json, path)?;
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
-    let buffers = container::buffers(&document, chunks.bin, path);
-    let reader = Reader { document: &document, buffers: &buffers };
+    let buffers = container::buffers(&document, chunks.bin, path, budget);
+    let reader = Reader { document: &document, buffers: &buffers, budget };
     scene.report.files = container::files(&document, path);
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
@@ -80,7 +82,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let material = |(i, m)| material::convert(m).map_err(|e| Error::input(path, format!("material {i}: {e}")));
     scene.materials = document.materials.iter().enumerate().map(material).collect::<Result<_>>()?;
     (scene.textures, scene.report.skipped_images) =
-        texture::resolve(&reader, path, &mut scene.materials, options, &mut |w| warnings.push(w));
+        texture::resolve(&reader, path, &mut scene.materials, loading, &mut |w| warnings.push(w));
 
     let input = |e| Error::input(path, e);
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));

@@ -82,7 +82,10 @@ impl<'a> RigBuilder<'a> {
             let mesh = node.mesh.and_then(|m| document.meshes.get(m.value()));
             let targets = |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
             let mut weights = node.weights.clone().or_else(|| mesh?.weights.clone()).unwrap_or_default();
-            weights.resize(mesh.and_then(targets).unwrap_or(0), 0.0);
+            let count = mesh.and_then(targets).unwrap_or(0);
+            // of each node that shows the mesh; an empty list is refused with the scene
+            let room = reader.budget.take(16 * count as u64, || format!("a node with {count} morph targets"));
+            weights.resize(if room.is_ok() { count } else { 0 }, 0.0);
             weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
             Node { name: text(&node.name).to_owned(), parent: p.parent, local, weights }
         };

@@ -108,7 +108,12 @@ pub(super) fn targets(
 ) -> Result<Vec<MorphTarget>, String> {
     let deltas = |accessor: Option<AccessorIndex>, t: usize| -> Result<Vec<Vec3>, String> {
         let Some(accessor) = accessor else { return Ok(Vec::new()) };
-        let deltas = reader.floats(same_count(reader, accessor, vertices)?, Type::Vec3, Vec3::from_array)?;
+        // all zeros, of as many vertices as the file cares to name
+        let accessor = same_count(reader, accessor, vertices)?;
+        if !reader.has_data(accessor)? {
+            return Ok(Vec::new());
+        }
+        let deltas = reader.floats(accessor, Type::Vec3, Vec3::from_array)?;
         if let Some(v) = deltas.iter().position(|d| !d.is_finite()) {
             return Err(format!("accessor {accessor}: morph target {t} is not finite at vertex {v}"));
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::accessor::Reader;
 use super::{container, text, uri, valid};
 use crate::scene::load::picture::{self, DecodedImage};
-use crate::scene::load::{ImagesDecoded, LoadOptions};
+use crate::scene::load::{ImagesDecoded, Loading};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
 /// Decodes the images that materials use, and turns the glTF textures in their slots into the scene's.
@@ -23,10 +23,10 @@ pub(super) fn resolve(
     reader: &Reader,
     path: &Path,
     materials: &mut [Material],
-    options: &LoadOptions,
+    loading: Loading,
     warn: &mut dyn FnMut(String),
 ) -> (Vec<Texture>, usize) {
-    let document = reader.document;
+    let (document, options) = (reader.document, loading.options);
     let mut used: BTreeMap<usize, Option<usize>> = BTreeMap::new();
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
         used.insert(slot.texture, None);
@@ -38,6 +38,12 @@ pub(super) fn resolve(
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
+    // several images may name one file: the first of them is decoded
+    let mut first_of = BTreeMap::new();
+    let content = |i: usize| document.images.get(i).map(|image| (image.uri.as_deref(), image.buffer_view.map(|v| v.value())));
+    let same: BTreeMap<usize, usize> =
+        wanted.iter().map(|&i| (i, content(i).map_or(i, |c| *first_of.entry(c).or_insert(i)))).collect();
+    wanted.retain(|i| same[i] == *i);
     let (count, done) = (wanted.len(), AtomicUsize::new(0));
     let decode = |i: usize| {
         let decoded = image(reader, path, i);
@@ -63,7 +69,7 @@ pub(super) fn resolve(
             warn(format!("texture {index} has no PNG or JPEG image: shown without it"));
             continue;
         };
-        let Some(Ok(picture)) = decoded.get(&source) else { continue };
+        let Some(Ok(picture)) = same.get(&source).and_then(|first| decoded.get(first)) else { continue };
         let (wrap, filter) = sampler(document, texture.sampler);
         let image = &document.images[source];
         let file = image.uri.as_deref().filter(|u| !uri::is_data(u)).unwrap_or_default();
@@ -92,11 +98,11 @@ pub(super) fn resolve(
 fn image(reader: &Reader, path: &Path, index: usize) -> Result<DecodedImage, String> {
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
-        (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name)),
+        (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name), reader.budget),
         (Some(file), None) => {
-            let bytes = container::read_uri(file, path).map_err(|e| format!("cannot be read ({e})"))?;
+            let bytes = container::read_uri(file, path, reader.budget).map_err(|e| format!("cannot be read ({e})"))?;
             let name = if uri::is_data(file) { text(&image.name) } else { file };
-            picture::decode(&bytes, name)
+            picture::decode(&bytes, name, reader.budget)
         }
         (None, None) => Err("has neither a URI nor a buffer view".to_owned()),
     }

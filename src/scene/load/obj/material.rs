@@ -9,7 +9,7 @@ use super::mtl::{self, MtlMaterial, unused};
 use super::texture::{Textures, is_cut_out, is_normal_map, roughness};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::load::LoadOptions;
+use crate::scene::load::Loading;
 use crate::scene::load::text::{self, unquoted, without_comment};
 use crate::scene::material::{AlphaMode, Material, MaterialKind};
 use crate::scene::settings::MtlDissolve;
@@ -35,8 +35,8 @@ fn loose(name: &str) -> String {
 
 impl<'a> MaterialLibrary<'a> {
     /// No material yet.
-    pub(super) fn new(options: LoadOptions<'a>) -> Self {
-        Self { exact: HashMap::new(), loose: HashMap::new(), textures: Textures::new(options) }
+    pub(super) fn new(loading: Loading<'a>) -> Self {
+        Self { exact: HashMap::new(), loose: HashMap::new(), textures: Textures::new(loading) }
     }
 
     /// The file that the model `obj` refers to as one of `names`.

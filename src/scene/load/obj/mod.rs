@@ -26,14 +26,14 @@ use material::MaterialLibrary;
 use parse::{Group, NONE, ObjFile};
 
 use super::text::{self, unquoted, without_comment};
-use super::{LoadOptions, find};
+use super::{Loading, find};
 use crate::error::Result;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh, distant_centre};
 
 /// Reads an `.obj` file and the material libraries that it names.
-pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     // the file, and what is odd about it
-    let mut file = parse::parse(path)?;
+    let mut file = parse::parse(path, loading.budget)?;
     let mut scene = Scene::default();
     if file.open_faces > 0 {
         scene.report.warnings.push(format!("{} faces with fewer than three corners: left out", file.open_faces));
@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     }
 
     // materials
-    let mut materials = MaterialLibrary::new(*options);
+    let mut materials = MaterialLibrary::new(loading);
     let is_complete = read_libraries(&file, path, &mut materials, &mut scene)?;
     let mut grey = None;
     let mut unknown: HashMap<String, usize> = HashMap::new();

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::polygon::PolygonTriangulator;
 use crate::error::{Error, Result};
+use crate::memory::Budget;
 use crate::scene::load::text::{self, Lines, trim};
 
 /// No such index.
@@ -49,9 +50,11 @@ pub(super) struct ObjFile {
 }
 
 /// Parses a file; errors name the line.
-pub(super) fn parse(path: &Path) -> Result<ObjFile> {
+pub(super) fn parse(path: &Path, budget: &Budget) -> Result<ObjFile> {
     let unread = |e: std::io::Error| Error::read(path, &e);
-    let mut lines = Lines::new(crate::files::open_regular(path).map_err(unread)?).map_err(unread)?;
+    let file = crate::files::open_regular(path).map_err(unread)?;
+    budget.read(usize::try_from(file.metadata().map_err(unread)?.len()).unwrap_or(usize::MAX));
+    let mut lines = Lines::new(file).map_err(unread)?;
     let mut parser = Parser::default();
     loop {
         let failed = match lines.next().map_err(unread)? {

@@ -7,7 +7,7 @@ use super::mtl::Map;
 use crate::error::Error;
 use crate::scene::load::find::{self, Finder};
 use crate::scene::load::picture::{self, DecodedImage};
-use crate::scene::load::{ImagesDecoded, LoadOptions, text};
+use crate::scene::load::{ImagesDecoded, Loading, text};
 use crate::scene::material::TextureSlot;
 use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
 
@@ -27,7 +27,7 @@ type TextureKey = (Texels, [Option<(PathBuf, [u32; 2])>; 2], bool);
 
 /// The pictures and textures of a model's materials.
 pub(super) struct Textures<'a> {
-    options: LoadOptions<'a>,
+    loading: Loading<'a>,
     pub finder: Finder,
     pictures: HashMap<PathBuf, Option<DecodedImage>>,
     textures: HashMap<TextureKey, usize>,
@@ -37,9 +37,9 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     /// No texture yet.
-    pub(super) fn new(options: LoadOptions<'a>) -> Self {
+    pub(super) fn new(loading: Loading<'a>) -> Self {
         let (pictures, textures) = (HashMap::new(), HashMap::new());
-        Self { options, finder: Finder::default(), pictures, textures, missing: HashSet::new() }
+        Self { loading, finder: Finder::default(), pictures, textures, missing: HashSet::new() }
     }
 
     /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can be read.
@@ -114,6 +114,9 @@ impl<'a> Textures<'a> {
         });
         let named = files.iter().zip(&pictures).find_map(|(file, picture)| file.as_ref().filter(|_| picture.is_some()));
         let name = named?.1.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // what two maps are combined to has a texel for each of the larger one
+        let texels = pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
+        self.loading.budget.take(4 * texels, || format!("the texture {name}")).ok()?;
         let DecodedImage { width, height, texels } = make(pictures);
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
         let texture = scene.textures.len();
@@ -149,11 +152,15 @@ impl<'a> Textures<'a> {
             return;
         }
         report.files.push(path.to_owned());
-        let picture = if self.options.textures {
+        let picture = if self.loading.options.textures {
             let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e).to_string());
             let name = path.to_string_lossy();
-            let decoded = bytes.and_then(|b| picture::decode(&b, &name).map_err(|e| format!("{name} {e}")));
-            (self.options.progress)(ImagesDecoded { done: self.pictures.len() + 1, of: None });
+            let budget = self.loading.budget;
+            let decoded = bytes.and_then(|b| {
+                budget.read(b.len());
+                picture::decode(&b, &name, budget).map_err(|e| format!("{name} {e}"))
+            });
+            (self.loading.options.progress)(ImagesDecoded { done: self.pictures.len() + 1, of: None });
             decoded.map_err(|e| report.warnings.push(format!("{e}: shown without it"))).ok()
         } else {
             report.skipped_images += 1;

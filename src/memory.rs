@@ -1,0 +1,199 @@
+//! Memory that files may take. What is loaded together, a scene or the images of a comparison, shares one [`Budget`], and asks it before memory is taken for what a header
+//! promises: a file of 32 bytes can name an image of a gigabyte, and accessors without data or nodes that share a mesh multiply what little a file holds.
+//!
+//! Unless the user says how much may be taken (`--memory-limit`), it is at most half of the machine's memory, and at most [`FREE`] more than [`PER_BYTE`] times the
+//! bytes that were read: images of one colour, which compress best of all that people use, stay far below.
+
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use bytesize::ByteSize;
+
+use crate::error::{Error, Result};
+
+/// Bytes that may be taken whatever was read.
+const FREE: u64 = 1 << 30;
+/// Bytes that may be taken for each byte that was read.
+const PER_BYTE: u64 = 256;
+/// What is taken for the machine's memory where the system does not tell.
+const UNKNOWN: u64 = 8 << 30;
+
+static LIMIT: OnceLock<u64> = OnceLock::new();
+
+/// Sets how much budgets that are made from now on may give, in bytes, in place of what follows from the machine. The first call counts.
+pub fn set_limit(bytes: u64) {
+    let _ = LIMIT.set(bytes);
+}
+
+/// What is loaded together.
+#[derive(Debug)]
+pub struct Budget {
+    /// Bytes.
+    limit: u64,
+    /// Whether what was read limits it, too.
+    follows_files: bool,
+    account: Mutex<Account>,
+}
+
+#[derive(Debug, Default)]
+struct Account {
+    /// Bytes of files.
+    read: u64,
+    /// Bytes of memory.
+    taken: u64,
+    /// Why a request was refused: the first one.
+    refused: Option<String>,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        match LIMIT.get() {
+            Some(&limit) => Self::of(limit),
+            None => Self { follows_files: true, ..Self::of(machine_memory() / 2) },
+        }
+    }
+}
+
+impl Budget {
+    /// Bytes, whatever is read.
+    pub fn of(limit: u64) -> Self {
+        Self { limit, follows_files: false, account: Mutex::default() }
+    }
+
+    /// Notes that bytes of a file were read.
+    pub fn read(&self, bytes: usize) {
+        let mut account = self.account.lock().unwrap_or_else(PoisonError::into_inner);
+        account.read = account.read.saturating_add(bytes as u64);
+    }
+
+    /// Takes bytes for `what`, a noun phrase that begins the sentence of an error. What was taken is not given back: a budget is of one load.
+    ///
+    /// # Errors
+    /// Why they are not to be had, as the end of a sentence. [`Budget::check`] says the same, also where this error has become a warning.
+    pub fn take(&self, bytes: u64, what: impl FnOnce() -> String) -> Result<(), String> {
+        self.take_for_now(bytes, 0, what)
+    }
+
+    /// As [`Budget::take`]; `besides`: bytes that are needed until what is kept is made.
+    ///
+    /// # Errors
+    /// Those of [`Budget::take`].
+    pub fn take_for_now(&self, bytes: u64, besides: u64, what: impl FnOnce() -> String) -> Result<(), String> {
+        let mut account = self.account.lock().unwrap_or_else(PoisonError::into_inner);
+        if account.refused.is_some() {
+            return Err("is left out: the memory that this load may take is used up".to_owned());
+        }
+        let kept = account.taken.saturating_add(bytes);
+        let all = kept.saturating_add(besides);
+        let of_files = FREE.saturating_add(account.read.saturating_mul(PER_BYTE));
+        let reason = if all > self.limit {
+            format!("more than the {} that files loaded together may take", size(self.limit))
+        } else if self.follows_files && all > of_files {
+            format!("more than {} of files make likely", size(account.read))
+        } else {
+            account.taken = kept;
+            return Ok(());
+        };
+        let before = if account.taken > 0 { " with what was loaded before" } else { "" };
+        let enough = (all / (1 << 30) + 1).saturating_mul(3 << 29);
+        let remedy = match enough < machine_memory() {
+            true => format!("if that is meant, allow it: --memory-limit {}", size(enough).replace(' ', "")),
+            false => format!("--memory-limit would allow it, but this machine has {}", size(machine_memory())),
+        };
+        let message = format!("takes {}{before}, {reason}; {remedy}", size(all));
+        account.refused = Some(format!("{} {message}", what()));
+        Err(message)
+    }
+
+    /// Fails if a request was refused.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] with what was asked for first and could not be had.
+    pub fn check(&self) -> Result<()> {
+        match &self.account.lock().unwrap_or_else(PoisonError::into_inner).refused {
+            // names in files may have control characters
+            Some(message) => Err(Error::OutOfMemory(message.replace(char::is_control, " "))),
+            None => Ok(()),
+        }
+    }
+}
+
+fn size(bytes: u64) -> String {
+    ByteSize(bytes).display().iec().to_string()
+}
+
+/// Bytes that this process can have: the machine's memory, or what its control group or its limit of address space leaves of it.
+fn machine_memory() -> u64 {
+    static MEMORY: OnceLock<u64> = OnceLock::new();
+    *MEMORY.get_or_init(|| [physical(), control_group(), address_space()].into_iter().flatten().min().unwrap_or(UNKNOWN))
+}
+
+#[cfg(target_os = "linux")]
+fn physical() -> Option<u64> {
+    let system = rustix::system::sysinfo();
+    #[allow(clippy::useless_conversion, reason = "the system's word, which has 32 bits on some machines")]
+    Some(u64::from(system.totalram).saturating_mul(u64::from(system.mem_unit.max(1))))
+}
+
+/// The smallest limit of the process's control group and those above it (cgroups version 2).
+#[cfg(target_os = "linux")]
+fn control_group() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/cgroup").ok()?;
+    let name = text.lines().find_map(|line| line.strip_prefix("0::/"))?;
+    let group = std::path::Path::new("/sys/fs/cgroup").join(name);
+    let limit = |folder: &std::path::Path| std::fs::read_to_string(folder.join("memory.max")).ok()?.trim().parse().ok();
+    group.ancestors().take_while(|folder| folder.starts_with("/sys/fs/cgroup")).filter_map(limit).min()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn physical() -> Option<u64> {
+    None
+}
+
+#[cfg(not(target_os = "linux"))]
+fn control_group() -> Option<u64> {
+    None
+}
+
+#[cfg(target_os = "linux")]
+fn address_space() -> Option<u64> {
+    rustix::process::getrlimit(rustix::process::Resource::As).current
+}
+
+#[cfg(not(target_os = "linux"))]
+fn address_space() -> Option<u64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_follows_what_was_read() {
+        let budget = Budget { follows_files: true, ..Budget::of(1 << 40) };
+        assert!(budget.take_for_now(1 << 20, FREE - (1 << 20), || unreachable!()).is_ok());
+        assert!(budget.take(FREE - (1 << 20), || unreachable!()).is_ok());
+        budget.read(4);
+        assert!(budget.take(4 * PER_BYTE, || unreachable!()).is_ok());
+        assert!(budget.check().is_ok());
+        let refused = budget.take(1, || "image `a`".to_owned()).unwrap_err();
+        assert!(refused.contains("4 B of files make likely") && refused.contains("--memory-limit"), "{refused}");
+        // once is enough: what failed is not forgotten
+        budget.read(1 << 30);
+        assert!(budget.take(0, || unreachable!()).is_err());
+        let error = budget.check().unwrap_err();
+        assert!(error.exit_code() == 5 && error.to_string().starts_with("out of memory: image `a` takes 1.0 GiB"), "{error}");
+    }
+
+    #[test]
+    fn a_limit_that_was_set_counts_alone() {
+        let budget = Budget::of(4 << 30);
+        assert!(budget.take(4 << 30, || unreachable!()).is_ok());
+        assert!(budget.take(u64::MAX, || "all".to_owned()).unwrap_err().contains("more than the 4.0 GiB"));
+    }
+
+    #[test]
+    fn machines_have_memory() {
+        assert!((64 << 20..1 << 50).contains(&machine_memory()));
+    }
+}
