@@ -27,6 +27,8 @@ pub const TARGETS: &[(&str, Target)] = &[
     #[cfg(feature = "verify")]
     ("manifest", manifest),
     ("film", film),
+    ("hierarchy", hierarchy),
+    ("mesh_bin", mesh_bin),
     ("settings", settings),
 ];
 
@@ -159,6 +161,21 @@ pub fn film(folder: &Path, data: &[u8]) -> bool {
         assert_eq!(resumed.state.size(), [8, 8]);
         let _ = resumed.state.film();
     })
+}
+
+/// The scene whose hierarchies [`hierarchy`] reads.
+pub fn hierarchy_scene() -> Scene {
+    skylit::scene::builtin::by_name("cornell-box").unwrap()
+}
+
+/// A hierarchy as the cache keeps it, behind its checksum: depth and blocks.
+pub fn hierarchy(_folder: &Path, data: &[u8]) -> bool {
+    skylit::tracer::hierarchy_probes::is_accepted(&hierarchy_scene(), data)
+}
+
+/// The triangles of `skylit rays --mesh`.
+pub fn mesh_bin(folder: &Path, data: &[u8]) -> bool {
+    accepted(skylit::scene::export::read_mesh_bin(&write(folder, "a.bin", data)), play)
 }
 
 /// Settings of a render: JSON as the viewer saves them, TOML as people write them, and words in a line.

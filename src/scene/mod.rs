@@ -39,6 +39,10 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
 
+/// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
+/// and rays would miss.
+pub const MAX_COORDINATE: f64 = 1e12;
+
 /// A mesh placed in the world.
 #[derive(Clone, Debug)]
 pub struct Instance {

@@ -37,6 +37,8 @@ pub use kind::{TracerKind, TracerNeeds};
 pub use raster_instance::RasterInstance;
 pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
+#[cfg(feature = "probes")]
+pub use wide::probes as hierarchy_probes;
 
 use crate::accel::features::SceneFeatures;
 use crate::accel::flatten::FlatScene;

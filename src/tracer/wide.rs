@@ -552,6 +552,53 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Option<Block> {
     }))
 }
 
+/// What a file of the cache may make of a hierarchy, for tests and fuzzers.
+#[cfg(feature = "probes")]
+pub mod probes {
+    use super::*;
+    use crate::scene::Scene;
+
+    /// The hierarchy of the triangles of a scene's first group, built here: its depth in four bytes, then its blocks as a cache file has them.
+    pub fn hierarchy(scene: &Scene) -> Vec<u8> {
+        let flat = FlatScene::new(scene);
+        let tree = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        [&tree.depth.to_le_bytes()[..], bytemuck::cast_slice(&tree.blocks)].concat()
+    }
+
+    /// Whether such bytes are taken for the hierarchy of that group. What is taken leads nowhere but into itself, and ends.
+    ///
+    /// # Panics
+    /// Where it does not.
+    pub fn is_accepted(scene: &Scene, bytes: &[u8]) -> bool {
+        let flat = FlatScene::new(scene);
+        let triangles = Triangles::of(&flat, &flat.groups[0]);
+        let opaque = flat.groups[0].opaque_count as u32;
+        let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
+        let built = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let Some((depth, blocks)) = bytes.split_first_chunk::<4>() else { return false };
+        if blocks.len() % size_of::<Block>() != 0 {
+            return false;
+        }
+        let blocks = bytemuck::pod_collect_to_vec(blocks);
+        let tree = WideBvh { blocks, depth: u32::from_le_bytes(*depth), ..built.clone() };
+        if check_loaded(&tree, &source, BuildPreset::Default).is_err() {
+            return false;
+        }
+        // as a device walks it, with no more steps than there are blocks
+        let mut stack = vec![(0, 1)];
+        for _ in 0..tree.blocks.len() {
+            let (at, level) = stack.pop().expect("every block is reached");
+            let block = &tree.blocks[at as usize];
+            assert!(level <= tree.depth + 1, "deeper than recorded");
+            if !wide::is_leaf(block) {
+                stack.extend(wide::children(block).map(|(_, child)| (child, level + 1)));
+            }
+        }
+        assert!(stack.is_empty(), "a block is reached twice");
+        true
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -212,6 +212,11 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             tolerance = { z_test = { bias = 0.005 } }\n[[frame]]\nname = \"a\"\nscene = \"builtin:stairs\"\n\
             render = \"ao --size 80x60 --spp 128 --ao-radius 2\"\ntracers = [\"all\"]\n"]),
         "film" => vec![film()],
+        "hierarchy" => vec![skylit::tracer::hierarchy_probes::hierarchy(&targets::hierarchy_scene())],
+        "mesh_bin" => vec![{
+            let words = [3_u32, 1].into_iter().chain(TRIANGLE.as_flattened().iter().map(|x| x.to_bits())).chain([0, 1, 2]);
+            words.flat_map(u32::to_le_bytes).collect()
+        }],
         "settings" => texts(&[
             r#"{"image":{"size":[64,48],"spp":16,"seed":7},"integrator":"path","integrators":{"ao":{"ao_radius":0.5}}}"#,
             "[image]\nsize = [64, 48]\nspp = 16\n",
@@ -251,6 +256,8 @@ survives! {
     camera_path 6000,
     manifest 3000,
     film 1000,
+    hierarchy 3000,
+    mesh_bin 3000,
     settings 3000,
 }
 

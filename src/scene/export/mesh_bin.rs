@@ -7,7 +7,7 @@ use glam::{DAffine3, Vec3};
 use super::{ExportStats, icosphere, write_buffered};
 use crate::error::{Error, Result};
 use crate::files;
-use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
+use crate::scene::{Geometry, Instance, MAX_COORDINATE, Material, Mesh, Scene, TriangleMesh};
 
 /// All triangles of `scene` in the world space of its file, as single-precision positions and indices.
 ///
@@ -109,6 +109,12 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     let indices: Vec<[u32; 3]> = indices.iter().map(|t| t.map(u32::from_le_bytes)).collect();
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
         return Err(Error::input(path, format!("the position of vertex {i} is not finite (NaN or infinite)")));
+    }
+    if let Some(i) = positions.iter().position(|p| f64::from(p.abs().max_element()) > MAX_COORDINATE) {
+        return Err(Error::input(
+            path,
+            format!("the position of vertex {i} is beyond {MAX_COORDINATE:e} units: scale the mesh down"),
+        ));
     }
     if let Some(t) = indices.iter().position(|t| t.iter().any(|&i| i >= nv)) {
         return Err(Error::input(path, format!("triangle {t} refers to a vertex beyond the last, {}", nv.saturating_sub(1))));

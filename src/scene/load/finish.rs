@@ -8,12 +8,9 @@ use rayon::prelude::*;
 use super::{normals, ranges, tangents};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
+use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::Deformation;
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
-
-/// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
-/// and rays would miss.
-const MAX_COORDINATE: f64 = 1e12;
 
 /// Smallest extent of a scene: below it products of lengths are lost in single precision, those of drivers' triangle tests first.
 const MIN_EXTENT: f64 = 1e-12;
