@@ -105,6 +105,9 @@ impl Error {
             std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
             std::io::ErrorKind::IsADirectory => "is a folder, not a file".to_owned(),
             std::io::ErrorKind::UnexpectedEof => "ends early: it was cut off".to_owned(),
+            std::io::ErrorKind::OutOfMemory => {
+                return Error::OutOfMemory(format!("{}: {error}; --memory-limit allows more", path.as_ref().display()));
+            }
             _ => format!("cannot read: {error}"),
         };
         Self::input(path, message)

@@ -11,6 +11,10 @@ use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::memory;
+
+/// Most bytes of a text that people write: settings, manifests, scripts.
+const MAX_TEXT: u64 = 64 << 20;
 
 /// Number of first bytes by which a file is told from what others put in its place.
 const START: u64 = 1024;
@@ -149,14 +153,24 @@ pub mod probes {
 /// The bytes of a regular file.
 ///
 /// # Errors
-/// Those of [`open_regular`].
+/// Those of [`open_regular`], and [`io::ErrorKind::OutOfMemory`] for a file that is larger than what files may take ([`memory::limit`]).
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
-    let mut file = open_regular(path)?;
+    read_up_to(open_regular(path)?, memory::limit(), io::ErrorKind::OutOfMemory)
+}
+
+/// The bytes of a file of at most this size, also where it grows meanwhile; `kind`: the error of a larger one.
+fn read_up_to(file: File, max: u64, kind: io::ErrorKind) -> io::Result<Vec<u8>> {
     let length = file.metadata()?.len();
     let mut bytes = Vec::new();
-    // what cannot be had is an error of memory, and no panic
-    bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
-    file.read_to_end(&mut bytes)?;
+    if length <= max {
+        // what cannot be had is an error of memory, and no panic
+        bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
+        file.take(max.saturating_add(1)).read_to_end(&mut bytes)?;
+    }
+    if length > max || bytes.len() as u64 > max {
+        let size = length.max(bytes.len() as u64);
+        return Err(io::Error::new(kind, format!("{size} bytes are more than the {max} that may be read")));
+    }
     Ok(bytes)
 }
 
@@ -165,7 +179,8 @@ pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
 /// # Errors
 /// Those of [`open_regular`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
 pub fn read_regular_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(read_regular(path)?).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.utf8_error()))
+    String::from_utf8(read_up_to(open_regular(path)?, MAX_TEXT, io::ErrorKind::FileTooLarge)?)
+        .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.utf8_error()))
 }
 
 /// Whether a file belongs to this process's user or to root; true where files have no owners.

@@ -44,12 +44,14 @@ struct Account {
     refused: Option<String>,
 }
 
+/// Bytes that files which are loaded together may take at most.
+pub fn limit() -> u64 {
+    LIMIT.get().copied().unwrap_or_else(|| machine_memory() / 2)
+}
+
 impl Default for Budget {
     fn default() -> Self {
-        match LIMIT.get() {
-            Some(&limit) => Self::of(limit),
-            None => Self { follows_files: true, ..Self::of(machine_memory() / 2) },
-        }
+        Self { follows_files: LIMIT.get().is_none(), ..Self::of(limit()) }
     }
 }
 

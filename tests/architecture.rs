@@ -12,7 +12,8 @@ use syn::{Attribute, Item, ItemMod, ItemUse, Macro, UseTree};
 /// Rooms of src/ (folders, and files beside lib.rs) from the bottom up. A room uses rooms of lower layers only, none of its own layer.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["colour", "files", "memory"],
+    &["memory"],
+    &["colour", "files"],
     &["settings"],
     &["interface"],
     &["output", "ray", "sampling"],

@@ -107,12 +107,19 @@ fn summary(c: &Comparison) -> String {
         return format!("{}: no pixel to compare, over {}", c.channels.join(" "), c.mask);
     }
     let error = if c.bias_standard_error > 0.0 { format!(" +- {:.1e}", c.bias_standard_error) } else { String::new() };
-    let mut parts = vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)];
+    let mut parts = match c.rmse == 0.0 {
+        true => vec!["rmse 0".to_owned()],
+        false => vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)],
+    };
     parts.extend(c.ssim.map(|v| format!("ssim {v:.4}")));
     parts.extend(c.flip.map(|v| format!("flip {v:.4}")));
     parts.extend(c.flip_hdr.map(|v| format!("flip over exposures {v:.4}")));
     parts.extend(c.bad.outliers.map(|n| format!("outliers {n}")));
-    parts.extend(c.reference_standard_error.map(|e| format!("standard error of the reference {e:.1e}")));
+    parts.extend(c.reference_standard_error.map(|e| match e < c.rmse {
+        true => format!("standard error of the reference {e:.1e}"),
+        // of which the RMSE is a part
+        false => format!("standard error of the reference {e:.1e}, so that the true RMSE is at most about as large"),
+    }));
     format!("{}: {}, over {}", c.channels.join(" "), parts.join(", "), c.mask)
 }
 
@@ -180,6 +187,17 @@ mod tests {
         assert!(difference_text(&d).ends_with("differs in 1 of 2 pixels; NaN or infinite in one of the images: 1 pixels"));
         let none = compare(&a, &b, &[0.0; 5]).unwrap();
         assert_eq!(difference_text(&none), "no pixel to compare");
+    }
+
+    #[test]
+    fn errors_are_said_as_they_are_meant() {
+        let of = |rmse, reference_standard_error| {
+            let channels = vec!["R".to_owned()];
+            summary(&Comparison { rmse, reference_standard_error, channels, mask_pixels: 1, pixels: 1, ..Default::default() })
+        };
+        assert!(of(0.0, None).starts_with("R: rmse 0, over"), "{}", of(0.0, None));
+        assert!(of(0.02, Some(1e-3)).contains("rmse 2.000e-2, bias +0.000e0, standard error of the reference 1.0e-3, over"));
+        assert!(of(0.02, Some(3e-2)).contains("so that the true RMSE is at most about as large"));
     }
 
     #[test]

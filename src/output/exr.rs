@@ -5,7 +5,7 @@
 //! `G` and `B`, for programs that look for these alone; [`read`] drops the copies. The same image gives the same bytes.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use exr::block::chunk::CompressedBlock;
@@ -325,12 +325,12 @@ fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
 
 /// Whether a block has more in its header than its pixels can. Blocks of the methods DWAA and DWAB begin with eleven numbers of 64 bits, of which the second to the tenth are numbers of bytes and values;
 /// the decoder takes memory for as many.
-fn has_block_that_is_too_large(file: File, meta: &MetaData) -> exr::error::Result<bool> {
+fn has_block_that_is_too_large(file: Cursor<&[u8]>, meta: &MetaData) -> exr::error::Result<bool> {
     let has_sizes = |h: &Header| matches!(h.compression, Compression::DWAA(_) | Compression::DWAB(_));
     if !meta.headers.iter().any(has_sizes) {
         return Ok(false);
     }
-    for chunk in exr::block::read(BufReader::new(file), false)?.all_chunks(false)? {
+    for chunk in exr::block::read(file, false)?.all_chunks(false)? {
         let chunk = chunk?;
         let Some(header) = meta.headers.get(chunk.layer_index).filter(|h| has_sizes(h)) else { continue };
         let (size, bytes) = match &chunk.compressed_block {
@@ -459,12 +459,12 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
         exr::error::Error::Invalid(m) if m == "reference to missing bytes" => Error::input(path, ENDS_EARLY),
         e => Error::input(path, format!("not a readable EXR: {e}")),
     };
-    files::read_start(path)?;
-    let open = || files::open_regular(path).map_err(|e| Error::read(path, &e));
+    let data = files::read(path)?;
+    let open = || Cursor::new(&data[..]);
     // the header first: it says how much memory the rest will take
-    let meta = MetaData::read_from_unbuffered(open()?, false).map_err(broken)?;
+    let meta = MetaData::read_from_buffered(open(), false).map_err(broken)?;
     check_windows(&meta).map_err(|message| Error::input(path, message))?;
-    let bytes = std::fs::metadata(path).map_err(|e| Error::read(path, &e))?.len();
+    let bytes = data.len() as u64;
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
         return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
     }
@@ -478,7 +478,7 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
         let taken = budget.take_for_now(bytes(display), bytes(data), || format!("an image of {}x{} pixels", size.0, size.1));
         taken.or_else(|_| budget.check().map_err(|e| e.of(path)))?;
     }
-    if has_block_that_is_too_large(open()?, &meta).map_err(broken)? {
+    if has_block_that_is_too_large(open(), &meta).map_err(broken)? {
         return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));
     }
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
@@ -487,7 +487,7 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
         matches!(h.compression, Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16)
     };
     let reader = if meta.headers.iter().all(is_simple) { reader } else { reader.non_parallel() };
-    let file = reader.from_unbuffered(open()?).map_err(broken)?;
+    let file = reader.from_buffered(open()).map_err(broken)?;
 
     // all parts have the same display window
     let display = Window::from(file.attributes.display_window);

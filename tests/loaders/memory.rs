@@ -129,3 +129,20 @@ fn images_that_are_compared() {
     assert_eq!(load(&two).unwrap_err().exit_code(), 5);
     assert_eq!(load(&Budget::of((9 << 20) - 1)).unwrap_err().exit_code(), 5);
 }
+
+/// A file with a hole of many gigabytes takes no place on the disk, and none in memory.
+#[test]
+fn files_that_are_too_large() {
+    let folder = Folder::new();
+    let sparse = |name: &str, bytes: u64| {
+        let path = folder.path(name);
+        std::fs::File::create(&path).and_then(|file| file.set_len(bytes)).unwrap();
+        path
+    };
+    let path = sparse("a.glb", 1 << 42);
+    let error = load(&path).map(|_| ()).unwrap_err();
+    assert!(error.exit_code() == 5 && error.to_string().contains("more than the"), "{error}");
+    let path = sparse("a.toml", 1 << 31);
+    let error = skylit::renderer::RenderSettings::load(&path).map(|_| ()).unwrap_err();
+    assert!(error.exit_code() == 3 && error.to_string().contains("more than the 67108864 that may be read"), "{error}");
+}
