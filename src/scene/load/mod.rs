@@ -3,6 +3,7 @@
 mod brhan;
 mod camera_path;
 mod compact;
+pub mod confine;
 mod environment;
 mod find;
 mod finish;
@@ -14,9 +15,10 @@ mod tangents;
 mod text;
 mod warnings;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use camera_path::load_camera_path;
+pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
 
 use crate::error::{Error, Result};
@@ -29,6 +31,8 @@ pub struct LoadOptions<'a> {
     pub textures: bool,
     /// Called after each image that was decoded, from several threads.
     pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
+    /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are not opened.
+    pub confine: Confine<'a>,
 }
 
 /// Images decoded so far.
@@ -42,7 +46,7 @@ pub struct ImagesDecoded {
 
 impl Default for LoadOptions<'_> {
     fn default() -> Self {
-        Self { textures: true, progress: &|_| () }
+        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere }
     }
 }
 
@@ -86,6 +90,14 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
     load_file_with(path, options)
 }
 
+/// The files that a scene is read from: models, materials, buffers and images, also those that cannot be read. None of a built-in one.
+///
+/// # Errors
+/// As [`load`].
+pub fn files_of(source: &str) -> Result<Vec<PathBuf>> {
+    Ok(load_with(source, &LoadOptions { textures: false, ..Default::default() })?.report.files)
+}
+
 /// Whether a path has the extension of a scene file; it need not exist.
 pub fn is_scene_file(path: impl AsRef<Path>) -> bool {
     FORMATS.contains(&extension(path.as_ref()).as_str())
@@ -100,7 +112,9 @@ pub fn load_file(path: &Path) -> Result<Scene> {
 }
 
 fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let mut scene = read(path, options)?;
+    let folder = options.confine.folder_for(path)?;
+    let confine = folder.as_deref().map_or(Confine::Nowhere, Confine::Folder);
+    let mut scene = read(path, &LoadOptions { confine, ..*options })?;
     scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     finish::finish(&mut scene, path)?;

@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let text = text::decode(&bytes);
     let wrong = |e: String| Error::input(path, text::shown(&e));
     let statements = parse::statements(&text).map_err(wrong)?;
-    let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::default());
+    let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::new(options));
     let mut loader = Loader { path, options, scene, models, finder };
     for mut statement in statements {
         loader.statement(&mut statement)?;
@@ -133,7 +133,9 @@ impl Loader<'_> {
         let file = s.need("file").map_err(here)?;
         let to_world = transform(s).map_err(here)?;
         let material = material(s).map_err(here)?;
-        let found = self.finder.find(&[file], &[self.path]).map_err(|searched| {
+        let found = self.finder.find(&[file], &[self.path]);
+        self.finder.check(self.path)?;
+        let found = found.map_err(|searched| {
             let searched = find::list(&searched);
             here(format!("line {}: the model {file} does not exist; searched in {searched}", s.line))
         })?;

@@ -71,9 +71,10 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let (document, doubles) = container::document(&chunks.json, path)?;
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
-    let buffers = container::buffers(&document, chunks.bin, path);
+    let confine = options.confine.folder();
+    scene.report.files = container::files(&document, path, confine)?;
+    let buffers = container::buffers(&document, chunks.bin, path, confine);
     let reader = Reader { document: &document, buffers: &buffers };
-    scene.report.files = container::files(&document, path);
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();

@@ -45,6 +45,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     // materials
     let mut materials = MaterialLibrary::new(*options);
     let is_complete = read_libraries(&file, path, &mut materials, &mut scene)?;
+    materials.check(path)?;
     let mut grey = None;
     let mut unknown: HashMap<String, usize> = HashMap::new();
 
