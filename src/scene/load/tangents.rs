@@ -1,5 +1,7 @@
 //! Tangents by MikkTSpace, the space that normal maps are baked in. <http://www.mikktspace.com>
 
+use std::collections::HashMap;
+
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
@@ -135,37 +137,161 @@ impl Geometry for Corners<'_> {
     }
 }
 
+/// A vertex's tangents, of each texture that has its own.
+type Tangents = [Vec4; 3];
+
+/// Tangents that differ by no more than this are the same.
+const TOLERANCE: f32 = 1e-5;
+/// Side of the cells that tangents are sorted into: a component and all that are the same lie in two cells at most.
+const CELL: f64 = 2.5e-5;
+/// Copies of a vertex that are compared one after another. Of those that have more, cells are looked into.
+const MAX_CHAIN: usize = 16;
+
+fn differ(a: &Tangents, b: &Tangents) -> bool {
+    a.iter().zip(b).any(|(a, b)| (*a - *b).abs().max_element() > TOLERANCE)
+}
+
+/// The cell of each component of tangents, and of each the last cell in which the same may lie.
+fn cells(tangents: &Tangents) -> [[i32; 2]; 12] {
+    let at = |x: f64| (x / CELL + 0.5).floor() as i32;
+    let reach = 1.1 * f64::from(TOLERANCE);
+    let mut cells = [[0; 2]; 12];
+    for (cell, x) in cells.iter_mut().zip(tangents.iter().flat_map(|t| t.to_array()).map(f64::from)) {
+        *cell = [at(x - reach), at(x + reach)];
+    }
+    cells
+}
+
+/// Vertices with their tangents, and the copies of each vertex.
+struct Copies {
+    tangents: Vec<Tangents>,
+    /// Whether a vertex has tangents yet.
+    taken: Vec<bool>,
+    /// Another copy of the vertex that a vertex copies, or itself.
+    next: Vec<u32>,
+    /// Of vertices with many copies: the copies by the cells of their tangents.
+    sorted: HashMap<(u32, [i32; 12]), Vec<u32>>,
+    /// The last copy of each of these vertices.
+    last: HashMap<u32, u32>,
+    #[cfg(test)]
+    comparisons: usize,
+}
+
+impl Copies {
+    fn new(vertices: usize) -> Self {
+        Self {
+            tangents: vec![Tangents::default(); vertices],
+            taken: vec![false; vertices],
+            next: (0..vertices as u32).collect(),
+            sorted: HashMap::new(),
+            last: HashMap::new(),
+            #[cfg(test)]
+            comparisons: 0,
+        }
+    }
+
+    fn is_same(&mut self, vertex: u32, tangents: &Tangents) -> bool {
+        #[cfg(test)]
+        {
+            self.comparisons += 1;
+        }
+        !differ(&self.tangents[vertex as usize], tangents)
+    }
+
+    /// The copy of a vertex, or the vertex, with these tangents: the first of several. `true`: it is a new copy.
+    fn find(&mut self, vertex: u32, tangents: Tangents) -> (u32, bool) {
+        if !self.taken[vertex as usize] {
+            (self.taken[vertex as usize], self.tangents[vertex as usize]) = (true, tangents);
+            return (vertex, false);
+        }
+
+        // most vertices have few copies
+        let mut last = vertex;
+        for _ in 0..MAX_CHAIN {
+            if self.is_same(last, &tangents) {
+                return (last, false);
+            }
+            match self.next[last as usize] {
+                next if next == last => return (self.push(last, tangents), true),
+                next => last = next,
+            }
+        }
+
+        // a vertex with many: its copies are sorted once, and each new one where it belongs
+        if !self.last.contains_key(&vertex) {
+            let mut copy = vertex;
+            loop {
+                self.sort(vertex, copy);
+                match self.next[copy as usize] {
+                    next if next == copy => break,
+                    next => copy = next,
+                }
+            }
+            self.last.insert(vertex, copy);
+        }
+        if let Some(copy) = self.find_sorted(vertex, &tangents) {
+            return (copy, false);
+        }
+        let copy = self.push(self.last[&vertex], tangents);
+        self.sort(vertex, copy);
+        self.last.insert(vertex, copy);
+        (copy, true)
+    }
+
+    /// Adds a copy behind another.
+    fn push(&mut self, before: u32, tangents: Tangents) -> u32 {
+        let copy = self.tangents.len() as u32;
+        self.next[before as usize] = copy;
+        self.tangents.push(tangents);
+        self.taken.push(true);
+        self.next.push(copy);
+        copy
+    }
+
+    fn sort(&mut self, vertex: u32, copy: u32) {
+        let cell = self.tangents[copy as usize].map(|t| t.to_array().map(|x| (f64::from(x) / CELL + 0.5).floor() as i32));
+        let mut key = [0; 12];
+        key.copy_from_slice(cell.as_flattened());
+        self.sorted.entry((vertex, key)).or_default().push(copy);
+    }
+
+    /// The first copy with these tangents among those that are sorted.
+    fn find_sorted(&mut self, vertex: u32, tangents: &Tangents) -> Option<u32> {
+        let cells = cells(tangents);
+        // bits of a number choose among the two cells of those components that have two
+        let two: Vec<usize> = (0..cells.len()).filter(|&k| cells[k][0] != cells[k][1]).collect();
+        let mut found: Option<u32> = None;
+        for choice in 0..1_u32 << two.len() {
+            let mut key = cells.map(|c| c[0]);
+            for (bit, &k) in two.iter().enumerate() {
+                key[k] = cells[k][(choice >> bit & 1) as usize];
+            }
+            // copies of a cell are few: they differ, and lie within it
+            for k in 0..self.sorted.get(&(vertex, key)).map_or(0, Vec::len) {
+                let copy = self.sorted[&(vertex, key)][k];
+                if found.is_none_or(|f| copy < f) && self.is_same(copy, tangents) {
+                    found = Some(copy);
+                }
+            }
+        }
+        found
+    }
+}
+
 /// Gives each vertex the tangents of its corners (three per triangle, for each array that is not empty), with a copy of the vertex for each other tangents.
 /// Returns what each copy is one of.
 fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
-    const NONE: u32 = u32::MAX;
-    type Tangents = [Vec4; 3];
     let at = |corner: usize| corners.map(|c| c.get(corner).copied().unwrap_or_default());
-    let differ = |a: &Tangents, b: &Tangents| a.iter().zip(b).any(|(a, b)| (*a - *b).abs().max_element() > 1e-5);
-    let mut tangents: Vec<Tangents> = vec![Tangents::default(); mesh.positions.len()];
-    let mut taken = vec![false; mesh.positions.len()];
-    // chains of copies: next[v] is another copy of the vertex that v copies
-    let mut next = vec![NONE; mesh.positions.len()];
+    let mut vertices = Copies::new(mesh.positions.len());
     let mut copies: Vec<u32> = Vec::new();
     for (corner, index) in mesh.indices.iter_mut().flatten().enumerate() {
-        let tangent = at(corner);
-        let mut v = *index as usize;
-        while taken[v] && differ(&tangents[v], &tangent) && next[v] != NONE {
-            v = next[v] as usize;
-        }
-        if !taken[v] {
-            (taken[v], tangents[v]) = (true, tangent);
-        } else if differ(&tangents[v], &tangent) {
-            let copy = tangents.len();
-            next[v] = copy as u32;
+        let (vertex, is_new) = vertices.find(*index, at(corner));
+        if is_new {
             copies.push(*index);
-            tangents.push(tangent);
-            taken.push(true);
-            next.push(NONE);
-            v = copy;
         }
-        *index = v as u32;
+        *index = vertex;
     }
+    let Copies { mut tangents, taken, .. } = vertices;
     fn extend<T: Copy>(values: &mut Vec<T>, copies: &[u32]) {
         if !values.is_empty() {
             for &original in copies {
@@ -189,4 +315,84 @@ fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
     };
     (mesh.tangents, mesh.clearcoat_tangents, mesh.anisotropy_tangents) = (array(0), array(1), array(2));
     copies
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As [`Copies::find`] without cells: each copy is compared with.
+    fn one_by_one(copies: &mut Vec<Tangents>, tangents: Tangents) -> usize {
+        copies.iter().position(|c| !differ(c, &tangents)).unwrap_or_else(|| {
+            copies.push(tangents);
+            copies.len() - 1
+        })
+    }
+
+    /// Numbers that look random, 0 to 1.
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 1_u32;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        }
+    }
+
+    #[test]
+    fn copies_are_the_same_as_one_by_one() {
+        // tangents that are close to each other, on both sides of the tolerance
+        for (spread, textures) in [(1e-4, 1), (3e-5, 3), (2.0, 2)] {
+            let (mut number, mut expected, mut copies) = (numbers(), Vec::new(), Copies::new(1));
+            for _ in 0..2000 {
+                let mut tangents = Tangents::default();
+                for tangent in tangents.iter_mut().take(textures) {
+                    let [x, y, z] = [(); 3].map(|()| spread * (number() - 0.5));
+                    *tangent = Vec4::new(x, y + 0.5, z, if number() < 0.5 { -1.0 } else { 1.0 });
+                }
+                let before = expected.len();
+                let index = one_by_one(&mut expected, tangents);
+                assert_eq!(copies.find(0, tangents), (index as u32, before > 0 && expected.len() > before));
+            }
+            assert!(expected.len() > 2 * MAX_CHAIN, "{}", expected.len());
+        }
+    }
+
+    /// Every corner at one vertex has tangents of its own: comparisons grow with their number, not with its square.
+    #[test]
+    fn many_copies_of_a_vertex_cost_little_each() {
+        const CORNERS: u32 = 60_000;
+        let mut copies = Copies::new(1);
+        for k in 0..CORNERS {
+            let (sin, cos) = (k as f32 * 1e-4).sin_cos();
+            let (copy, is_new) = copies.find(0, [Vec4::new(cos, sin, 0.0, 1.0), Vec4::ZERO, Vec4::ZERO]);
+            assert!(copy == k && is_new == (k > 0));
+        }
+        let each = copies.comparisons as f64 / f64::from(CORNERS);
+        assert!(each < 2.0 * MAX_CHAIN as f64, "{each} comparisons a corner");
+    }
+
+    /// A fan of triangles that share a vertex and nothing else, each with a texture that lies another way.
+    #[test]
+    fn a_fan_of_many_triangles() {
+        let count = 60_000;
+        let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], normals: vec![Vec3::Z], ..Default::default() };
+        mesh.texcoords[0].push(Vec2::ZERO);
+        for k in 0..count {
+            let at = |turn: f32| Vec2::from_angle(turn);
+            let [from, to] = [k as f32, k as f32 + 0.5].map(|a| at(1e-4 * a));
+            for (p, uv) in [(from, at(3e-4 * k as f32)), (to, at(3e-4 * k as f32 + 1.0))] {
+                mesh.positions.push(p.extend(0.0));
+                mesh.normals.push(Vec3::Z);
+                mesh.texcoords[0].push(uv);
+            }
+            mesh.indices.push([0, 2 * k + 1, 2 * k + 2]);
+        }
+        let start = std::time::Instant::now();
+        let corners = corner_tangents(&mesh, None);
+        println!("tangents: {:?}", start.elapsed());
+        let start = std::time::Instant::now();
+        let copies = weld(&mut mesh, [&corners, &[], &[]]);
+        println!("welding: {:?}", start.elapsed());
+        assert!(copies.len() > 10_000 && mesh.tangents.len() == mesh.positions.len());
+    }
 }
