@@ -15,3 +15,4 @@ mod materials;
 mod obj;
 mod own;
 mod shared;
+mod squares;

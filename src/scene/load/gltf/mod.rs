@@ -18,7 +18,7 @@ mod skin;
 mod texture;
 mod uri;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use ::gltf::json::accessor::Accessor;
@@ -135,9 +135,10 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
         };
         return Err(Error::input(path, format!("requires the extension {name}, which skylit does not support: {remedy}")));
     }
+    let required: HashSet<&String> = document.extensions_required.iter().collect();
     scene.report.extensions.extend(document.extensions_used.iter().map(|name| FileExtension {
         name: name.clone(),
-        required: document.extensions_required.contains(name),
+        required: required.contains(name),
         ignored: !KNOWN.contains(&name.as_str()),
     }));
     for name in document.extensions_used.iter().filter(|n| !KNOWN.contains(&n.as_str())) {
