@@ -155,6 +155,35 @@ fn a_polygon_of_many_corners() {
     assert!(scene.report.warnings.iter().any(|w| w.contains("more than 10000 corners")), "{:?}", scene.report.warnings);
 }
 
+/// A normal map on triangles whose vertices lie at one position and are not the same, and on others around one vertex, which share edges: deep recursion for MikkTSpace.
+#[test]
+fn tangents_at_one_position() {
+    let count = 60_000;
+    let (mut apart, mut ring) = (
+        String::from("mtllib m.mtl\nusemtl m\nvn 0 0 1\n"),
+        String::from("mtllib m.mtl\nusemtl m\nv 0 0 0.5\nvt 0 0\nvn 0 0 1\n"),
+    );
+    for k in 0..count {
+        let (s, far) = (f64::from(k) / f64::from(count), 1.0 + 1e-4 * f64::from(k));
+        writeln!(apart, "v 0 0 0\nv {far} 0 0\nv 0 {far} 0\nvt {s} 0\nvt {s} 1\nvt {} 0\nf -3/-3/1 -2/-2/1 -1/-1/1", s + 1.0)
+            .unwrap();
+        let (sin, cos) = (std::f64::consts::TAU * s).sin_cos();
+        writeln!(ring, "v {cos} {sin} 0\nvt {cos} {sin}").unwrap();
+    }
+    (0..count).for_each(|k| writeln!(ring, "f 1/1/1 {0}/{0}/1 {1}/{1}/1", k + 2, (k + 1) % count + 2).unwrap());
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    std::fs::write(at("m.mtl"), "newmtl m\nnorm n.png\n").unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([128, 128, 255])).save(at("n.png")).unwrap();
+    for (name, text) in [("apart.obj", apart), ("ring.obj", ring)] {
+        std::fs::write(at(name), text).unwrap();
+        let start = Instant::now();
+        let scene = load_file(&at(name)).unwrap();
+        println!("{name}: {:?}", start.elapsed());
+        assert!(start.elapsed() < LIMIT && scene.report.tangents_computed == 1, "{name}: {:?}", start.elapsed());
+    }
+}
+
 /// A normal map on triangles that have a vertex in common, each with a tangent of its own there.
 #[test]
 fn a_vertex_of_many_triangles() {

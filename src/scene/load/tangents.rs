@@ -64,7 +64,10 @@ fn corner_tangents(mesh: &TriangleMesh, texture: Option<TextureSlot>) -> Vec<Vec
     let candidates = own.into_iter().chain([0, 1].map(|set| (set, Affine2::IDENTITY)));
     let chosen = candidates.into_iter().find(|(set, _)| varies(&mesh.texcoords[*set]));
     let (set, transform) = chosen.unwrap_or_default();
-    let mut corners = Corners { mesh, set, transform, tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
+    let mut corners = Corners { mesh, set, transform, faces: None, tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
+    if chosen.is_some() {
+        corners.set_crowded_apart();
+    }
     // its error type has no values
     let made = chosen.is_some() && generate_tangents(&mut corners).is_ok();
     let mut tangents = corners.tangents;
@@ -93,23 +96,144 @@ fn horizontal(normal: Vec3) -> Vec4 {
     if t.length_squared() > 1e-6 { t.normalize().extend(1.0) } else { Vec4::new(1.0, 0.0, 0.0, 1.0) }
 }
 
+/// The first member of a group; the way to it gets shorter.
+fn first(group: &mut [usize], mut member: usize) -> usize {
+    while group[member] != member {
+        group[member] = group[group[member]];
+        member = group[member];
+    }
+    member
+}
+
+/// Most triangles around a vertex that MikkTSpace is asked about: it takes the square of their number, and recurses as deep.
+const MAX_AROUND: u32 = 1024;
+
 struct Corners<'a> {
     mesh: &'a TriangleMesh,
     set: usize,
     /// Applied to the coordinates of the set.
     transform: Affine2,
+    /// The triangles that MikkTSpace is asked about; `None`: all.
+    faces: Option<Vec<u32>>,
     tangents: Vec<Vec4>,
 }
 
 impl Corners<'_> {
+    fn triangle(&self, face: usize) -> usize {
+        self.faces.as_ref().map_or(face, |faces| faces[face] as usize)
+    }
+
     fn vertex(&self, face: usize, corner: usize) -> usize {
-        self.mesh.indices[face][corner] as usize
+        self.mesh.indices[self.triangle(face)][corner] as usize
+    }
+
+    /// Without negative zeros, which are other bits of the same number.
+    fn texcoord(&self, vertex: usize) -> [f32; 2] {
+        // glTF's v points down, the algorithm's up; the sign of the bitangent depends on it
+        let uv = self.transform.transform_point2(self.mesh.texcoords[self.set][vertex]);
+        [uv.x + 0.0, 1.0 - uv.y]
+    }
+
+    /// What makes vertices one: bits of position, normal and texture coordinates.
+    fn key(&self, vertex: usize) -> [u32; 8] {
+        let ([x, y, z], [nx, ny, nz]) = (self.mesh.positions[vertex].to_array(), self.mesh.normals[vertex].to_array());
+        let [u, v] = self.texcoord(vertex);
+        [x, y, z, nx, ny, nz, u, v].map(|value| (value + 0.0).to_bits())
+    }
+
+    /// For each triangle, whether it is at a vertex with more than [`MAX_AROUND`]; `None` if none is.
+    fn crowded(&self) -> Option<Vec<bool>> {
+        let indices = &self.mesh.indices;
+        if indices.len() <= MAX_AROUND as usize {
+            return None;
+        }
+        let mut around = vec![0_u32; self.mesh.positions.len()];
+        indices.iter().flatten().for_each(|&v| around[v as usize] += 1);
+
+        // vertices by a hash first: hardly a mesh has so many triangles with one
+        let slots = self.mesh.positions.len().next_power_of_two();
+        let mut counts = vec![0_u32; slots];
+        for (vertex, &count) in around.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let mix = |hash: u64, bits: u32| (hash ^ u64::from(bits)).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(23);
+            let hash = self.key(vertex).into_iter().fold(0, mix);
+            counts[hash as usize & (slots - 1)] += count;
+        }
+        if counts.iter().all(|&count| count <= MAX_AROUND) {
+            return None;
+        }
+
+        // then by what they are
+        let mut exact: HashMap<[u32; 8], u32> = HashMap::new();
+        for (vertex, count) in around.iter().enumerate() {
+            *exact.entry(self.key(vertex)).or_default() += count;
+        }
+        let is_crowded = |v: u32| exact[&self.key(v as usize)] > MAX_AROUND;
+        let crowded: Vec<bool> = indices.iter().map(|t| t.iter().any(|&v| is_crowded(v))).collect();
+        crowded.contains(&true).then_some(crowded)
+    }
+
+    /// Leaves triangles at crowded vertices out, and gives their corners the mean of the tangents of the triangles around the vertex that share edges with each other, weighted by
+    /// angle: that is MikkTSpace's, where an edge has two triangles.
+    fn set_crowded_apart(&mut self) {
+        let Some(crowded) = self.crowded() else { return };
+        let apart: Vec<usize> = (0..crowded.len()).filter(|&t| crowded[t]).collect();
+
+        // each triangle's own tangent at its corners, and the vertices that these are of
+        let (mut numbers, mut vertices): (HashMap<[u32; 8], u32>, Vec<u32>) = (HashMap::new(), Vec::new());
+        let (mut tangents, mut handedness): (Vec<Vec3>, Vec<bool>) = (Vec::new(), Vec::new());
+        for &t in &apart {
+            let corners = self.mesh.indices[t].map(|v| v as usize);
+            let p = corners.map(|v| self.mesh.positions[v]);
+            let uv = corners.map(|v| Vec2::from(self.texcoord(v)));
+            let [(e1, d1), (e2, d2)] = [1, 2].map(|k| (p[k] - p[0], uv[k] - uv[0]));
+            let preserves = d1.perp_dot(d2) > 0.0;
+            let along = (e1 * d2.y - e2 * d1.y) * if preserves { 1.0 } else { -1.0 };
+            for k in 0..3 {
+                let normal = self.mesh.normals[corners[k]];
+                let angle = (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k]);
+                let tangent = (along - normal * normal.dot(along)).normalize_or_zero();
+                tangents.push(tangent * if angle.is_finite() { angle } else { 0.0 });
+                let next = numbers.len() as u32;
+                vertices.push(*numbers.entry(self.key(corners[k])).or_insert(next));
+            }
+            handedness.push(preserves);
+        }
+
+        // corners of triangles that share an edge belong together
+        let mut group: Vec<usize> = (0..vertices.len()).collect();
+        let mut edges: HashMap<(u32, u32, bool), [usize; 2]> = HashMap::new();
+        for (t, &preserves) in handedness.iter().enumerate() {
+            for k in 0..3 {
+                let [mut a, mut b] = [3 * t + k, 3 * t + (k + 1) % 3];
+                if vertices[a] > vertices[b] {
+                    (a, b) = (b, a);
+                }
+                let others = *edges.entry((vertices[a], vertices[b], preserves)).or_insert([a, b]);
+                for (corner, other) in [a, b].into_iter().zip(others) {
+                    let (corner, other) = (first(&mut group, corner), first(&mut group, other));
+                    group[corner.max(other)] = corner.min(other);
+                }
+            }
+        }
+
+        // sums of each group, which its first corner has
+        let mut sums = vec![Vec3::ZERO; tangents.len()];
+        for (corner, tangent) in tangents.iter().enumerate() {
+            sums[first(&mut group, corner)] += *tangent;
+        }
+        for (t, &triangle) in apart.iter().enumerate() {
+            let w = if handedness[t] { 1.0 } else { -1.0 };
+            for k in 0..3 {
+                self.tangents[3 * triangle + k] = sums[first(&mut group, 3 * t + k)].normalize_or_zero().extend(w);
+            }
+        }
+        self.faces = Some((0..).zip(&crowded).filter(|(_, crowded)| !**crowded).map(|(t, _)| t).collect());
     }
 }
 
 impl Geometry for Corners<'_> {
     fn num_faces(&self) -> usize {
-        self.mesh.indices.len()
+        self.faces.as_ref().map_or(self.mesh.indices.len(), Vec::len)
     }
 
     fn num_vertices_of_face(&self, _face: usize) -> usize {
@@ -117,22 +241,22 @@ impl Geometry for Corners<'_> {
     }
 
     fn position(&self, face: usize, vert: usize) -> [f32; 3] {
-        self.mesh.positions[self.vertex(face, vert)].into()
+        // without negative zeros: vertices are told apart by bits
+        (self.mesh.positions[self.vertex(face, vert)] + Vec3::ZERO).into()
     }
 
     fn normal(&self, face: usize, vert: usize) -> [f32; 3] {
-        self.mesh.normals[self.vertex(face, vert)].into()
+        (self.mesh.normals[self.vertex(face, vert)] + Vec3::ZERO).into()
     }
 
     fn tex_coord(&self, face: usize, vert: usize) -> [f32; 2] {
-        // glTF's v points down, the algorithm's up; the sign of the bitangent depends on it
-        let uv = self.transform.transform_point2(self.mesh.texcoords[self.set][self.vertex(face, vert)]);
-        [uv.x, 1.0 - uv.y]
+        self.texcoord(self.vertex(face, vert))
     }
 
     fn set_tangent(&mut self, tangent_space: Option<TangentSpace>, face: usize, vert: usize) {
         if let Some(space) = tangent_space {
-            self.tangents[3 * face + vert] = space.tangent_encoded().into();
+            let corner = 3 * self.triangle(face) + vert;
+            self.tangents[corner] = space.tangent_encoded().into();
         }
     }
 }
@@ -369,6 +493,34 @@ mod tests {
         }
         let each = copies.comparisons as f64 / f64::from(CORNERS);
         assert!(each < 2.0 * MAX_CHAIN as f64, "{each} comparisons a corner");
+    }
+
+    /// A disk of triangles around its centre, with one vertex for each two neighbours.
+    fn disk(count: u32, flip: f32) -> TriangleMesh {
+        let mut mesh = TriangleMesh { positions: vec![Vec3::new(0.0, 0.0, 0.25)], ..Default::default() };
+        mesh.texcoords[0].push(Vec2::ZERO);
+        for k in 0..count {
+            let at = Vec2::from_angle(std::f32::consts::TAU * k as f32 / count as f32);
+            mesh.positions.push(at.extend(0.0));
+            mesh.texcoords[0].push(Vec2::new(at.x, flip * at.y));
+            mesh.indices.push([0, k + 1, (k + 1) % count + 1]);
+        }
+        mesh.normals = vec![Vec3::Z; mesh.positions.len()];
+        mesh
+    }
+
+    /// Around a vertex with too many triangles tangents are what MikkTSpace has around one with fewer.
+    #[test]
+    fn crowded_vertices_have_the_same_tangents() {
+        for flip in [1.0, -1.0] {
+            let few = corner_tangents(&disk(MAX_AROUND, flip), None);
+            let many = corner_tangents(&disk(MAX_AROUND + 1, flip), None);
+            for (k, (a, b)) in few.iter().zip(&many).enumerate() {
+                assert!((*a - *b).abs().max_element() < 2e-2, "{k}: {a} {b}");
+            }
+        }
+        // a hundred thousand neither overflow the stack nor take long
+        assert!(corner_tangents(&disk(100_000, 1.0), None).iter().all(|t| t.is_finite()));
     }
 
     /// A fan of triangles that share a vertex and nothing else, each with a texture that lies another way.
