@@ -5,6 +5,8 @@
 //! A file is written without a name in the folder of its target, where the system has such files (Linux: `O_TMPFILE`), and gets its name once it is complete: whatever ends
 //! the process, no incomplete file and no temporary file stays. Elsewhere it is written under a name of its own next to its target, and renamed.
 
+pub mod plan;
+
 use std::borrow::Cow;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Seek};
@@ -99,10 +101,29 @@ fn target(path: &Path) -> io::Result<Target> {
             if path.file_name().is_none() {
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file"));
             }
-            Ok(Target::File { path: path.to_owned(), permissions: None })
+            // a link to a file that does not exist stays, too: that file is made
+            Ok(Target::File { path: link_target(path)?, permissions: None })
         }
         Err(e) => Err(e),
     }
+}
+
+/// Most links that are followed one after another, as Linux has it.
+const MAX_LINKS: usize = 40;
+
+/// The path that a name stands for once its own symbolic links are followed, whether there is a file or not.
+///
+/// # Errors
+/// More links than a system follows.
+pub fn link_target(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        match fs::read_link(&path) {
+            Ok(target) => path = folder_of(&path).join(target),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(io::Error::other("too many symbolic links"))
 }
 
 /// Opens a regular file to read. A device, FIFO or socket, which may never end or never answer, is an error at once, and so is a folder.
@@ -202,8 +223,8 @@ pub fn is_owned(metadata: &fs::Metadata) -> bool {
     }
 }
 
-/// The folder of a file.
-fn folder_of(path: &Path) -> &Path {
+/// The folder of a file; `.` for a name alone.
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

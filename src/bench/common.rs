@@ -15,7 +15,9 @@ use super::record::{BenchKind, BenchRecord};
 use super::report::ReportedRecord;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::report;
+use crate::scene::load;
 use crate::settings::parse::parse_seconds;
 use crate::terminal::console::{Console, command_line, visible};
 
@@ -73,11 +75,28 @@ impl OutputArgs {
         self.json.as_ref()?.as_ref()
     }
 
-    /// Checks that every output file can be written, before anything that takes long.
+    /// The files that are written.
+    fn plan(&self) -> FilePlan {
+        let mut plan = FilePlan::default();
+        self.json_file().iter().for_each(|path| plan.writes("--json", path));
+        self.plot.iter().for_each(|path| plan.writes("--plot", path));
+        self.html.iter().for_each(|folder| plan.writes_report("--html", folder));
+        plan
+    }
+
+    /// Checks that every output file can be written and replaces none of the records that are read, before anything that takes long.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a format of plots that there is not; those of [`files::check_writable`].
-    pub fn check(&self) -> Result<()> {
+    /// [`Error::Usage`] for a format of plots that there is not; those of [`FilePlan::check`] and [`files::check_writable`].
+    pub fn check(&self, records: &[PathBuf], baselines: &[PathBuf]) -> Result<()> {
+        let mut plan = self.plan();
+        records.iter().for_each(|path| plan.reads("a record", path));
+        baselines.iter().for_each(|path| plan.reads("--baseline", path));
+        plan.check()?;
+        self.check_writable()
+    }
+
+    fn check_writable(&self) -> Result<()> {
         self.plot.as_ref().map_or(Ok(()), |path| PlotFormat::of(path).map(drop))?;
         self.html.as_ref().map_or(Ok(()), |dir| std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, &e)))?;
         self.json_file().into_iter().chain(&self.plot).try_for_each(|path| files::check_writable(path))
@@ -134,8 +153,33 @@ impl CommonArgs {
     /// # Errors
     /// Those of [`OutputArgs::check`], for the CSV table too.
     pub fn check(&self) -> Result<()> {
-        self.outputs.check()?;
+        self.plan().check()?;
+        self.outputs.check_writable()?;
         self.csv.as_deref().map_or(Ok(()), files::check_writable)
+    }
+
+    /// Checks that no output replaces a scene, a file that one refers to, the environment, or the list of peers.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming both files; those of loading a scene, which is looked into where there is a file to be replaced.
+    pub fn check_inputs(&self, scenes: &[String], environment: Option<&Path>, peers: Option<&str>) -> Result<()> {
+        let mut plan = self.plan();
+        scenes.iter().for_each(|scene| plan.reads("the scene", scene));
+        environment.iter().for_each(|path| plan.reads_images("--environment", path));
+        peers.iter().for_each(|path| plan.reads("--peers", path));
+        plan.check()?;
+        if !plan.replaces_files() {
+            return Ok(());
+        }
+        let mut files = scenes.iter().filter(|scene| Path::new(scene).is_file());
+        files.try_for_each(|scene| plan.check_scene(&load::files_of(scene)?))
+    }
+
+    fn plan(&self) -> FilePlan {
+        let mut plan = self.outputs.plan();
+        self.csv.iter().for_each(|path| plan.writes("--csv", path));
+        self.baseline.iter().for_each(|path| plan.reads("--baseline", path));
+        plan
     }
 
     /// Writes the JSON record and the CSV table, if they are asked for; one that cannot be written does not prevent the other.

@@ -6,9 +6,27 @@ use clap::{Args, ValueHint};
 
 use crate::integrators::rays::Mode;
 use crate::scene::SceneSettings;
+use crate::scene::load::{Confine, LoadOptions};
 use crate::settings::parse::parse_limit;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
+
+/// Which files of a scene are read.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct LoadArgs {
+    /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
+    ///
+    /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
+    #[arg(long, hide_short_help = true)]
+    pub confine: bool,
+}
+
+impl LoadArgs {
+    /// The options of the loader.
+    pub fn options(self) -> LoadOptions<'static> {
+        LoadOptions { confine: if self.confine { Confine::SceneFolder } else { Confine::Nowhere }, ..LoadOptions::default() }
+    }
+}
 
 const RAYS_EXAMPLES: &str = "\
 Examples:
@@ -22,6 +40,9 @@ pub struct RaysArgs {
     /// Mesh: .bin (u32 vertices, u32 triangles, f32 xyz[], u32 abc[]) or any scene that `render` takes
     #[arg(long, value_name = "MESH", value_hint = ValueHint::FilePath)]
     pub mesh: String,
+    /// Files of the mesh
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Rays: f32 origin[3], tmin, direction[3], tmax each
     #[arg(long, value_name = "RAYS.bin", value_hint = ValueHint::FilePath)]
     pub rays: PathBuf,
@@ -61,6 +82,12 @@ pub struct ExportArgs {
     /// The same without -o
     #[arg(value_name = "OUTPUT", value_hint = ValueHint::FilePath, conflicts_with = "output")]
     pub output_argument: Option<PathBuf>,
+    /// Replace files beside a .gltf that no earlier export has written, too: its .bin and .png
+    #[arg(long)]
+    pub force: bool,
+    /// Files of the scene
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Meaning of the file
     #[command(flatten)]
     pub meaning: SceneSettings,

@@ -7,12 +7,14 @@ use std::time::Instant;
 use clap::{Args, ValueEnum, ValueHint};
 use serde_json::json;
 
+use super::args::LoadArgs;
 use super::compare_ao::{self, AoVsPathArgs};
 use crate::compare::picture::{self, PictureKind};
 use crate::compare::render::{self, Rendered};
 use crate::compare::{Entry, ImageSet, MAX_IMAGES, check_count, letter, page, parse_letter, short_names};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::film::Control;
 use crate::integrators::IntegratorSettings;
 use crate::integrators::lighting::LightingSettings;
@@ -111,6 +113,9 @@ pub struct CompareArgs {
     /// The image.
     #[command(flatten)]
     pub image: ImageSettings,
+    /// Files of the scene.
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Meaning of the scene's file.
     #[command(flatten)]
     pub meaning: SceneSettings,
@@ -179,8 +184,9 @@ impl CompareArgs {
         }
     }
 
-    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders. Adds first frames to the sources.
-    fn check(&self, sources: &mut Vec<Source>) -> Result<Vec<RenderSettings>> {
+    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders, and which files are read and written. Adds first frames to
+    /// the sources.
+    fn check(&self, sources: &mut Vec<Source>) -> Result<(Vec<RenderSettings>, FilePlan)> {
         // `--c` or `--b` alone would otherwise move up
         if self.b.is_some() && sources.len() == 1 {
             return Err(Error::Usage("--b: image A is missing: name a file, or render it with --a".into()));
@@ -201,6 +207,8 @@ impl CompareArgs {
             settings.iter_mut().for_each(render::add_ids);
         }
         self.add_first_frames(sources, &mut settings);
+        let plan = self.plan(sources, &settings)?;
+        plan.check()?;
         for path in self.difference.iter().chain(&self.flip) {
             picture::paths(sources.len(), self.reference, path)?.iter().try_for_each(|p| files::check_writable(p))?;
         }
@@ -208,7 +216,36 @@ impl CompareArgs {
             std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
         }
         self.csv.iter().try_for_each(|path| files::check_writable(path))?;
-        Ok(settings)
+        Ok((settings, plan))
+    }
+
+    /// The files that are read, as far as the command line tells, and those that will be written.
+    fn plan(&self, sources: &[Source], settings: &[RenderSettings]) -> Result<FilePlan> {
+        let mut plan = FilePlan::default();
+
+        // what is read
+        self.scene.iter().for_each(|scene| plan.reads("the scene", scene));
+        for settings in settings {
+            settings.lighting.environment_file().iter().for_each(|path| plan.reads_images("--environment", path));
+            settings.frames.camera_path.iter().for_each(|path| plan.reads("--camera-path", path));
+        }
+
+        // what is written
+        for (option, path) in [("--difference", &self.difference), ("--flip", &self.flip)] {
+            if let Some(path) = path {
+                picture::paths(sources.len(), self.reference, path)?.iter().for_each(|p| plan.writes(option, p));
+            }
+        }
+        self.csv.iter().for_each(|path| plan.writes("--csv", path));
+        self.html.iter().for_each(|folder| plan.writes_report("--html", folder));
+        for (k, source) in sources.iter().enumerate() {
+            match (source, &self.save) {
+                (Source::File(path), _) => plan.reads(&format!("image {}", letter(k)), path),
+                (Source::Render(_), Some(folder)) => plan.writes("--save", saved_file(folder, k)),
+                _ => {}
+            }
+        }
+        Ok(plan)
     }
 
     /// Adds the first frame of each preset that is judged at rest: what filters and histories do shows there.
@@ -236,10 +273,10 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
         return Ok(compare_ao::run(args, start)?);
     }
     let mut sources = args.sources();
-    let settings = args.check(&mut sources)?;
+    let (settings, plan) = args.check(&mut sources)?;
     let console = args.verbosity.console();
     let mut warnings = Warnings::new(console);
-    let entries = entries(args, &sources, settings, console, &mut warnings)?;
+    let entries = entries(args, &sources, settings, &plan, console, &mut warnings)?;
     let mut set = ImageSet::new(entries, args.reference, &args.options())?;
     set.warnings.iter().for_each(|w| warnings.add(w));
     set.warnings.clone_from(&warnings.list);
@@ -271,11 +308,17 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
     console.close(&record, set.judged().try_for_each(check))
 }
 
+/// The file that a render is saved in.
+fn saved_file(folder: &Path, index: usize) -> PathBuf {
+    folder.join(format!("{}.exr", letter(index).to_ascii_lowercase()))
+}
+
 /// Loads or renders all images.
 fn entries(
     args: &CompareArgs,
     sources: &[Source],
     settings: Vec<RenderSettings>,
+    plan: &FilePlan,
     console: Console,
     warnings: &mut Warnings,
 ) -> Result<Vec<Entry>> {
@@ -287,7 +330,9 @@ fn entries(
     let mut renderer = match (&args.scene, settings.is_empty()) {
         (Some(scene), false) => {
             interrupt::install();
-            Some(Renderer::open(scene, &args.device)?)
+            let renderer = Renderer::open_with(scene, &args.load.options(), &args.device)?;
+            plan.check_scene(&renderer.scene().report.files)?;
+            Some(renderer)
         }
         _ => None,
     };
@@ -306,7 +351,7 @@ fn entries(
                 let Rendered { image, frame, choices, without_effect } = render::render(renderer, &settings, &mut control)?;
                 drop(control);
                 if let Some(folder) = &args.save {
-                    output::save(&image, &folder.join(format!("{}.exr", letter(k).to_ascii_lowercase())))?;
+                    output::save(&image, &saved_file(folder, k))?;
                 }
                 if let Some(what) = without_effect {
                     warnings.add(&format!("{} ({words}): {what}", letter(k)));

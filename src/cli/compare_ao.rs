@@ -5,8 +5,10 @@ use std::time::Instant;
 
 use clap::{Args, ValueHint};
 
+use super::args::LoadArgs;
 use crate::compare::ao_versus_path::{self, AoVersusPathSettings, ChoiceRecord, FitRecord, Report, page, significant};
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::film::Control;
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::lighting::LightingSettings;
@@ -69,6 +71,8 @@ pub struct AoVsPathArgs {
     #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
     plot: Option<PathBuf>,
     #[command(flatten)]
+    load: LoadArgs,
+    #[command(flatten)]
     meaning: SceneSettings,
     #[command(flatten)]
     camera: CameraSettings,
@@ -82,10 +86,11 @@ pub struct AoVsPathArgs {
 
 /// Compares and prints.
 pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
-    args.check()?;
+    let plan = args.check()?;
     interrupt::install();
     let console = args.verbosity.console();
-    let mut renderer = Renderer::open(&args.scene, &args.device)?;
+    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
     let mut control = CompareControl {
         progress: ProgressControl { progress: Progress::new("comparing", &console), keep_partial: false },
@@ -119,9 +124,18 @@ pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
 }
 
 impl AoVsPathArgs {
-    fn check(&self) -> Result<()> {
+    /// Checks the arguments, and returns which files are read and written.
+    fn check(&self) -> Result<FilePlan> {
         self.device.check()?;
         self.camera.check()?;
+        let mut plan = FilePlan::default();
+        plan.reads("the scene", &self.scene);
+        self.lighting.environment_file().iter().for_each(|path| plan.reads_images("--environment", path));
+        self.output.iter().for_each(|path| plan.writes("--output", path));
+        self.html.iter().for_each(|folder| plan.writes_report("--html", folder));
+        #[cfg(feature = "bench")]
+        self.plot.iter().for_each(|path| plan.writes("--plot", path));
+        plan.check()?;
         if let Some(path) = &self.output {
             if ImageFormat::of(path)? != ImageFormat::Exr {
                 return Err(Error::Usage(format!(
@@ -138,7 +152,7 @@ impl AoVsPathArgs {
         if let Some(path) = &self.plot {
             plot::check(path)?;
         }
-        Ok(())
+        Ok(plan)
     }
 
     fn settings(&self) -> AoVersusPathSettings {

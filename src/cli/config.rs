@@ -4,6 +4,7 @@ use clap::Args;
 
 use crate::error::Result;
 use crate::renderer::defaults::{self, DefaultsFile, DefaultsReport};
+use crate::scene::load::Confine;
 use crate::terminal::console::Console;
 
 /// Whether defaults are read.
@@ -17,12 +18,12 @@ pub struct ConfigArgs {
 }
 
 impl ConfigArgs {
-    /// The files of defaults for a scene.
+    /// The files of defaults for a scene; `confine`: where the files lie that the one beside it may name.
     ///
     /// # Errors
     /// Those of [`defaults::find`].
-    pub fn files(self, scene: Option<&str>) -> Result<Vec<DefaultsFile>> {
-        if self.no_config { Ok(Vec::new()) } else { defaults::find(scene) }
+    pub fn files(self, scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
+        if self.no_config { Ok(Vec::new()) } else { defaults::find(scene, confine) }
     }
 }
 

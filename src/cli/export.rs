@@ -5,9 +5,29 @@ use std::path::Path;
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
+
+/// Checks the files that are written beside a `.gltf`: they replace no file of the scene and, without `--force`, none that no earlier export to the same name has written.
+fn check_companions(args: &ExportArgs, mut plan: FilePlan, scene: &Scene, output: &Path) -> Result<()> {
+    let companions = export::companions(scene, output);
+    companions.iter().for_each(|path| plan.writes("a file beside the output", path));
+    plan.check()?;
+    plan.check_scene(&scene.report.files)?;
+    for path in companions {
+        if path.exists() && !args.force && !export::is_companion_of(&path, output) {
+            return Err(Error::Usage(format!(
+                "{}: would be replaced by what belongs to {}, and no earlier export has written it: choose another name, or add --force",
+                path.display(),
+                output.display()
+            )));
+        }
+        files::check_writable(&path)?;
+    }
+    Ok(())
+}
 
 /// Loads a scene and writes it.
 pub fn run(args: &ExportArgs) -> Result<()> {
@@ -23,9 +43,14 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             return Err(Error::Usage(format!("{path}: unknown format: the file name must end in .bin, .glb or .gltf")));
         }
     };
+    let mut plan = FilePlan::default();
+    plan.reads("the scene", &args.scene);
+    plan.writes("the output", output);
+    plan.check()?;
     files::check_writable(output)?;
-    let mut scene = load::load(&args.scene)?;
+    let mut scene = load::load_with(&args.scene, &args.load.options())?;
     args.meaning.apply(&mut scene);
+    check_companions(args, plan, &scene, output)?;
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let written = write(&scene, output)?;

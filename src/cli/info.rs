@@ -3,6 +3,7 @@
 use clap::{Args, ValueHint};
 use serde_json::json;
 
+use super::args::LoadArgs;
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::output::parse_size;
@@ -38,6 +39,9 @@ pub struct InfoArgs {
     /// Describe the file alone: no device is opened, and nothing is rendered
     #[arg(long)]
     pub no_device: bool,
+    /// Files of the scene
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Meaning of the file
     #[command(flatten)]
     pub meaning: SceneSettings,
@@ -87,7 +91,7 @@ struct OnDevice {
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
-    let mut scene = load::load(&args.scene)?;
+    let mut scene = load::load_with(&args.scene, &args.load.options())?;
     args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));

@@ -7,6 +7,7 @@ use super::args::RaysArgs;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::gpu::Device;
 use crate::integrators::rays;
 use crate::measure::stats::median;
@@ -22,12 +23,18 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     args.device.check()?;
     interrupt::install();
     let console = args.verbosity.console();
+    let mut plan = FilePlan::default();
+    plan.reads("--mesh", &args.mesh);
+    plan.reads("--rays", &args.rays);
     if let Some(hits) = &args.hits {
+        plan.writes("--hits", hits);
+        plan.check()?;
         files::check_writable(hits)?;
     }
     let mut set = read_rays(&args.rays)?;
     rays::check(&set)?;
-    let scene = read_mesh(&args.mesh)?;
+    let scene = read_mesh(args)?;
+    plan.check_scene(&scene.report.files)?;
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
@@ -85,10 +92,10 @@ pub fn run(args: &RaysArgs) -> Result<()> {
 }
 
 /// Reads a triangle soup (.bin) or any scene.
-fn read_mesh(source: &str) -> Result<Scene> {
-    let path = Path::new(source);
+fn read_mesh(args: &RaysArgs) -> Result<Scene> {
+    let path = Path::new(&args.mesh);
     let soup = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
-    if soup { export::read_mesh_bin(path) } else { load::load(source) }
+    if soup { export::read_mesh_bin(path) } else { load::load_with(&args.mesh, &args.load.options()) }
 }
 
 /// Reads RAYS.bin.

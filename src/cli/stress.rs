@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 use serde_json::json;
 
+use super::args::LoadArgs;
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::stress::{self, Check, Effort, Observer, Options, SECTIONS, Section, Summary, Verdict};
 use crate::terminal::console::{Failure, Verbosity, one_line};
 use crate::terminal::interrupt;
@@ -52,6 +54,9 @@ pub struct StressArgs {
     #[cfg(feature = "report")]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub html: Option<PathBuf>,
+    /// Files of the scene
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Device and tracer [default: all tracers that the device has]
     #[command(flatten)]
     pub device: DeviceSettings,
@@ -73,6 +78,7 @@ impl StressArgs {
             sections: self.sections.clone(),
             checks: self.checks.clone(),
             program: std::env::current_exe().ok(),
+            confine: self.load.confine,
         })
     }
 
@@ -88,6 +94,10 @@ impl StressArgs {
 pub fn run(args: &StressArgs) -> Result<(), Failure> {
     let options = args.options()?;
     if let Some(folder) = args.html() {
+        let mut plan = FilePlan::default();
+        args.scene.iter().for_each(|scene| plan.reads("the scene", scene));
+        plan.writes_report("--html", folder);
+        plan.check()?;
         std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
     }
     interrupt::install();

@@ -1,5 +1,6 @@
 //! `skylit verify`: reference frames in continuous integration.
 
+use std::io::Read;
 use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
@@ -7,13 +8,14 @@ use serde_json::json;
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::report;
 use crate::terminal::console::{Failure, Verbosity, command_line, one_line};
 use crate::terminal::interrupt;
 use crate::terminal::lines::Lines;
 use crate::tracer::DeviceSettings;
 use crate::verify::bless::Change;
-use crate::verify::manifest::{Frame, Manifest, Tracers, parse_tracers};
+use crate::verify::manifest::{self, Frame, Manifest, Tracers, parse_tracers};
 use crate::verify::selection::{Selection, Shard};
 use crate::verify::{Action, FrameResult, Observer, Options, Outcome, Summary, html, junit, plural};
 
@@ -68,6 +70,10 @@ pub struct VerifyArgs {
     /// Write a report, an HTML page that needs no network, into this folder: frames that differ beside their golden images
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub html: Option<PathBuf>,
+    /// Refuse frames whose scenes, settings, environments, camera paths or golden images lie outside of the manifest's folder, and scenes that refer to files there: for
+    /// manifests of strangers
+    #[arg(long)]
+    pub confine: bool,
     /// Device
     #[command(flatten)]
     pub device: DeviceSettings,
@@ -106,6 +112,8 @@ impl VerifyArgs {
 
 /// Renders, compares or blesses, and reports. Whatever ends the run early is in the results, too: those of an earlier run must not stay.
 pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
+    let loaded = Manifest::load_with(&args.folder, args.confine);
+    check_outputs(args, loaded.as_ref().ok())?;
     if let Some(path) = &args.junit {
         files::check_writable(path)?;
         // a pipe has no earlier results, and takes one document
@@ -113,7 +121,7 @@ pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
             junit::write_failure("the run did not end: it was killed, or is not done", &suite(args), path)?;
         }
     }
-    let (manifest, summary) = match judge(args) {
+    let (manifest, summary) = match judge(args, loaded) {
         Ok(judged) => judged,
         Err(error) => {
             let summary = Summary::of_failure(&one_line(&error.to_string()));
@@ -133,13 +141,34 @@ pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
     console.close(&record, summary.verdict())
 }
 
+/// Checks that results replace nothing that frames are made of or compared with, before a file is touched.
+fn check_outputs(args: &VerifyArgs, manifest: Option<&Manifest>) -> Result<()> {
+    let mut plan = FilePlan::default();
+    plan.reads("the manifest", args.folder.join(manifest::NAME));
+    manifest.iter().for_each(|manifest| manifest.add_inputs(&mut plan, true));
+    args.junit.iter().for_each(|path| plan.writes("--junit", path));
+    args.html.iter().for_each(|folder| plan.writes_report("--html", folder));
+    plan.check()?;
+    // which files scenes refer to is known only later: none of them is XML
+    if let Some(path) = args.junit.as_ref().filter(|path| path.is_file()) {
+        let mut start = Vec::new();
+        files::open_regular(path).and_then(|file| file.take(64).read_to_end(&mut start)).map_err(|e| Error::read(path, &e))?;
+        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
+        if !text.is_empty() && !text.starts_with(b"<") {
+            let message = "--junit would replace a file that is not XML: choose another name, or remove it";
+            return Err(Error::Usage(format!("{}: {message}", path.display())));
+        }
+    }
+    Ok(())
+}
+
 /// Renders the frames and judges them.
-fn judge(args: &VerifyArgs) -> Result<(Manifest, Summary)> {
+fn judge(args: &VerifyArgs, manifest: Result<Manifest>) -> Result<(Manifest, Summary)> {
     let options = args.options()?;
     if let Some(folder) = &args.html {
         std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
     }
-    let manifest = Manifest::load(&args.folder)?;
+    let manifest = manifest?;
     interrupt::install();
     let console = args.verbosity.console();
     for orphan in manifest.orphans() {

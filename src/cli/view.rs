@@ -10,7 +10,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::RenderSettings;
 use crate::renderer::defaults;
 use crate::renderer::settings::ImageSettings;
-use crate::scene::load;
+use crate::scene::load::{self, Confine};
 use crate::settings::parse::parse_rate;
 use crate::terminal::console::{Failure, Verbosity};
 use crate::tracer::DeviceSettings;
@@ -105,7 +105,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let given = args.settings.over_file(args.settings_file.as_deref())?;
     given.camera.check()?;
     check_has_effect(&given)?;
-    let files = args.config.files(args.scene.as_deref())?;
+    let files = args.config.files(args.scene.as_deref(), Confine::Nowhere)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
     device_settings.check()?;

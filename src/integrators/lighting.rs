@@ -64,6 +64,11 @@ impl LightingSettings {
         Ok(())
     }
 
+    /// The file or folder of the environment, if it is one.
+    pub fn environment_file(&self) -> Option<PathBuf> {
+        self.environment.as_ref().filter(|text| *text != "none" && parse_vector(text).is_err()).map(PathBuf::from)
+    }
+
     fn environment(&self, warn: &mut dyn FnMut(String)) -> Result<Option<Environment>> {
         let Some(text) = &self.environment else { return Ok(None) };
         if text == "none" {

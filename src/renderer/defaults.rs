@@ -13,6 +13,7 @@ use super::RenderSettings;
 use super::settings::CameraSettings;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::scene::load::{Confine, confine};
 use crate::settings::parse::{parse_vector, usage_message};
 use crate::tracer::DeviceSettings;
 
@@ -88,18 +89,28 @@ pub struct Resolved {
     pub reports: Vec<DefaultsReport>,
 }
 
-/// The files of defaults that exist: of the configuration folder, then of the folder of `scene`. Later ones replace what earlier ones say.
+/// The files of defaults that exist: of the configuration folder, then of the folder of `scene`. Later ones replace what earlier ones say. `confine`: where the file of
+/// the scene's folder, and those that it names, have to lie.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may not choose.
-pub fn find(scene: Option<&str>) -> Result<Vec<DefaultsFile>> {
+/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may not choose, and for a file that lies elsewhere.
+pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
     let load = |folder: PathBuf| DefaultsFile::load_if_exists(&folder.join(FILE_NAME));
     let own = config_folder().map(|f| load(f.join("skylit"))).transpose()?.flatten();
+    let confine = match (scene, &beside) {
+        (Some(scene), Some(_)) => confine.folder_for(Path::new(scene))?,
+        _ => None,
+    };
+    if let (Some(confine), Some(folder)) = (&confine, &beside) {
+        let file = folder.join(FILE_NAME);
+        confine::check(confine, &file, &file)?;
+    }
     let of_scene = beside.map(load).transpose()?.flatten();
     if let Some(file) = &of_scene {
         file.check_scene_settings()?;
+        file.check_confined(confine.as_deref())?;
     }
     Ok(own.into_iter().chain(of_scene).collect())
 }
@@ -134,6 +145,14 @@ impl DefaultsFile {
                 "a file beside a scene cannot set {what}: take it out, give it as an option or in your own {FILE_NAME}, or ignore this file with --no-config"
             ),
         ))
+    }
+
+    /// Checks that the files that it names lie below a folder.
+    fn check_confined(&self, folder: Option<&Path>) -> Result<()> {
+        let Some(folder) = folder else { return Ok(()) };
+        let environment = self.settings.lighting.environment_file();
+        let mut files = environment.iter().chain(&self.settings.frames.camera_path);
+        files.try_for_each(|path| confine::check(folder, &self.path, path))
     }
 
     /// Reads a file of defaults. Relative paths in it start at its folder.

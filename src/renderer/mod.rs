@@ -46,7 +46,8 @@ use crate::film::Control;
 use crate::gpu::{Device, KeptPipelines};
 use crate::integrators::lighting::LightingSettings;
 use crate::output::Image;
-use crate::scene::{Environment, Scene, SceneSettings, load};
+use crate::scene::load::{self, LoadOptions};
+use crate::scene::{Environment, Scene, SceneSettings};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 
@@ -108,6 +109,14 @@ impl Renderer {
     /// # Errors
     /// Those of [`load::load`] and [`Device::open`].
     pub fn open(scene: &str, settings: &DeviceSettings) -> Result<Self> {
+        Self::open_with(scene, &LoadOptions::default(), settings)
+    }
+
+    /// As [`Renderer::open`], with options of loading.
+    ///
+    /// # Errors
+    /// As [`Renderer::open`].
+    pub fn open_with(scene: &str, options: &LoadOptions, settings: &DeviceSettings) -> Result<Self> {
         let timed = |start: Instant| start.elapsed().as_secs_f64();
         let open = Instant::now();
         let (loaded, opened, seconds) = std::thread::scope(|scope| {
@@ -116,7 +125,7 @@ impl Renderer {
                 (Device::open(&settings.options()), timed(start))
             });
             let start = Instant::now();
-            let loaded = load::load(scene);
+            let loaded = load::load_with(scene, options);
             let load = timed(start);
             let (opened, device) = match device.join() {
                 Ok(done) => done,

@@ -8,7 +8,7 @@ mod mesh_bin;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-pub use gltf::export_gltf;
+pub use gltf::{companions, export_gltf, is_companion_of};
 pub use mesh_bin::{mesh_bin, read_mesh_bin, write_mesh_bin};
 
 use crate::error::Result;

@@ -43,7 +43,8 @@ use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::{Device, DeviceInfo, Options as GpuOptions};
-use crate::scene::{Scene, load};
+use crate::scene::Scene;
+use crate::scene::load::{self, Confine, LoadOptions};
 use crate::tracer::{DeviceSettings, Needs, Tracer, TracerChoice, TracerKind};
 
 /// Version of the JSON record; it changes when a key changes its meaning or goes.
@@ -269,6 +270,8 @@ pub struct Options {
     pub checks: Vec<String>,
     /// The program, which determinism starts again; `None`: what needs it is not applicable.
     pub program: Option<PathBuf>,
+    /// The scene may refer to files below its own folder alone.
+    pub confine: bool,
 }
 
 /// Learns of checks as they are made.
@@ -378,7 +381,9 @@ impl Setup {
     /// # Errors
     /// [`Error::Device`] for a tracer that the device lacks; those of opening it and of loading the scene.
     fn open(options: &Options, settings: &DeviceSettings) -> Result<Self> {
-        let scene = options.scene.as_deref().map(load::load).transpose()?;
+        let confine = if options.confine { Confine::SceneFolder } else { Confine::Nowhere };
+        let load = |scene: &str| load::load_with(scene, &LoadOptions { confine, ..LoadOptions::default() });
+        let scene = options.scene.as_deref().map(load).transpose()?;
         let device = Device::open(&GpuOptions { keep_pipelines: KEPT_PIPELINES, ..settings.options() })?;
         let tracers = tracers(&device.info, settings)?;
         let (device_settings, program) = (settings.clone(), options.program.clone());

@@ -10,8 +10,10 @@ use toml::Spanned;
 
 use super::tolerance::Tolerance;
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::renderer::RenderSettings;
 use crate::scene::builtin;
+use crate::scene::load::confine;
 use crate::tracer::TracerKind;
 
 /// Name of the manifest in its folder.
@@ -31,6 +33,8 @@ pub struct Manifest {
     pub pinned: Vec<String>,
     /// The frames, in the order of the file.
     pub frames: Vec<Frame>,
+    /// The folder without links that all files have to lie below; `None`: they may lie anywhere.
+    pub confine: Option<PathBuf>,
 }
 
 /// A frame to be rendered.
@@ -40,6 +44,8 @@ pub struct Frame {
     pub name: String,
     /// The scene: `builtin:NAME`, or a path from the folder.
     pub scene: String,
+    /// The file of settings that it names.
+    pub settings_file: Option<PathBuf>,
     /// How it is rendered; files that it names are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
     /// The tracers that render it.
@@ -133,6 +139,8 @@ struct Entry {
 struct Source<'a> {
     path: &'a Path,
     text: &'a str,
+    /// [`Manifest::confine`].
+    confine: Option<&'a Path>,
 }
 
 impl Source<'_> {
@@ -143,6 +151,15 @@ impl Source<'_> {
     fn error(&self, span: Range<usize>, message: impl std::fmt::Display) -> Error {
         Error::input(self.path, format!("line {}: {message}", self.line(span.start)))
     }
+
+    /// Checks that a file that the manifest names lies where it has to.
+    fn check_confined(&self, span: Range<usize>, path: &Path) -> Result<()> {
+        let Some(folder) = self.confine else { return Ok(()) };
+        confine::check(folder, self.path, path).map_err(|e| match e {
+            Error::Input { message, .. } => self.error(span, message),
+            other => other,
+        })
+    }
 }
 
 impl Manifest {
@@ -151,7 +168,20 @@ impl Manifest {
     /// # Errors
     /// [`Error::Input`], naming the line, for a file that cannot be read or is no manifest.
     pub fn load(folder: &Path) -> Result<Self> {
+        Self::load_with(folder, false)
+    }
+
+    /// As [`Manifest::load`]. `confine`: frames with scenes, settings, environments, camera paths or golden images that do not lie below the folder have a problem, and are not
+    /// read.
+    ///
+    /// # Errors
+    /// As [`Manifest::load`], and for a manifest that lies elsewhere.
+    pub fn load_with(folder: &Path, confine: bool) -> Result<Self> {
         let path = folder.join(NAME);
+        let confine = if confine { Some(std::fs::canonicalize(folder).map_err(|e| Error::read(folder, &e))?) } else { None };
+        if let Some(confine) = &confine {
+            confine::check(confine, &path, &path)?;
+        }
         let text = crate::files::read_regular_text(&path).map_err(|e| match e.kind() {
             ErrorKind::NotFound => {
                 Error::input(&path, format!("no such file: it lists the frames, such as {EXAMPLE} (docs/ci.md)"))
@@ -161,7 +191,7 @@ impl Manifest {
         if let Some(message) = crate::files::placeholder(text.as_bytes()).filter(|_| !text.is_empty()) {
             return Err(Error::input(&path, message));
         }
-        let source = Source { path: &path, text: &text };
+        let source = Source { path: &path, text: &text, confine: confine.as_deref() };
         let file: File = toml::from_str(&text).map_err(|e| match e.span() {
             Some(span) => source.error(span, e.message()),
             None => Error::input(&path, e.message()),
@@ -180,12 +210,52 @@ impl Manifest {
                 frame.problem = Some(source.error(span, message).to_string());
             }
         }
-        Ok(Self { folder: folder.to_owned(), pinned: file.drivers.pinned, frames })
+        Ok(Self { folder: folder.to_owned(), pinned: file.drivers.pinned, frames, confine })
     }
 
     /// The file of a frame's golden image.
     pub fn golden(&self, frame: &Frame) -> PathBuf {
         self.folder.join(format!("{}.{}", frame.name, frame.format.extension()))
+    }
+
+    /// Checks that a golden image may be written: by a link it would be written outside of the folder.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the link.
+    pub fn check_golden(&self, frame: &Frame) -> Result<()> {
+        let path = self.golden(frame);
+        if !path.is_symlink() {
+            return Ok(());
+        }
+        let folder = std::fs::canonicalize(&self.folder).map_err(|e| Error::read(&self.folder, &e))?;
+        let target = crate::files::link_target(&path).map_err(|e| Error::write(&path, &e))?;
+        // of a file that does not exist yet, where it would be
+        let place = std::fs::canonicalize(&target).or_else(|_| std::fs::canonicalize(crate::files::folder_of(&target)));
+        match place.is_ok_and(|place| place.starts_with(&folder)) {
+            true => Ok(()),
+            false => Err(Error::Usage(format!(
+                "{}: is a link to {}, outside of the manifest's folder, where no golden image is written: remove the link",
+                path.display(),
+                target.display()
+            ))),
+        }
+    }
+
+    /// The files that frames are rendered from, as far as the manifest tells, and with `goldens` their golden images.
+    pub fn add_inputs(&self, plan: &mut FilePlan, goldens: bool) {
+        plan.reads("the manifest", self.folder.join(NAME));
+        for frame in &self.frames {
+            let settings = self.settings(frame);
+            if !frame.scene.starts_with(BUILTIN) {
+                plan.reads("a scene", self.scene(frame));
+            }
+            frame.settings_file.iter().for_each(|path| plan.reads("a file of settings", path));
+            settings.lighting.environment_file().iter().for_each(|path| plan.reads_images("an environment", path));
+            settings.frames.camera_path.iter().for_each(|path| plan.reads("a camera path", path));
+            if goldens {
+                plan.reads("a golden image", self.golden(frame));
+            }
+        }
     }
 
     /// The scene of a frame, as [`crate::Renderer::open`] takes it.
@@ -252,6 +322,7 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
     let mut frame = Frame {
         name: one_line(entry.name.get_ref()),
         scene: entry.scene.get_ref().clone(),
+        settings_file: entry.settings.as_ref().map(|file| folder.join(file.get_ref())),
         settings: RenderSettings::default(),
         tracers: Tracers::Auto,
         tolerance: entry.tolerance.or(defaults.tolerance).unwrap_or_default(),
@@ -282,6 +353,10 @@ fn complete(
     }
     check_scene(source, folder, &entry.scene)?;
     frame.settings = settings(source, folder, defaults, entry)?;
+    let golden = folder.join(format!("{}.{}", frame.name, frame.format.extension()));
+    let environment = frame.settings.lighting.environment_file();
+    let named = environment.iter().chain(&frame.settings.frames.camera_path).map(|path| folder.join(path));
+    named.chain([golden]).try_for_each(|path| source.check_confined(span.clone(), &path))?;
     let tracers = entry.tracers.as_ref().or(defaults.tracers.as_ref());
     if let Some(names) = tracers {
         frame.tracers = parse_tracers(names.get_ref()).map_err(|e| source.error(names.span(), e))?;
@@ -306,6 +381,7 @@ fn check_scene(source: &Source, folder: &Path, name: &Spanned<String>) -> Result
         };
     }
     let path = folder.join(name.get_ref());
+    source.check_confined(name.span(), &path)?;
     match path.is_file() {
         true => Ok(()),
         false => Err(source.error(name.span(), format!("no scene {}: paths begin at the manifest's folder", path.display()))),
@@ -316,6 +392,7 @@ fn check_scene(source: &Source, folder: &Path, name: &Spanned<String>) -> Result
 fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) -> Result<RenderSettings> {
     let mut settings = RenderSettings::default();
     if let Some(file) = &entry.settings {
+        source.check_confined(file.span(), &folder.join(file.get_ref()))?;
         let load = RenderSettings::load(&folder.join(file.get_ref()));
         settings = load.map_err(|e| source.error(file.span(), e))?;
     }

@@ -23,6 +23,7 @@ use selection::Selection;
 use session::Session;
 
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::film::Control;
 use crate::output::Image;
 use crate::renderer::CHOSEN;
@@ -299,6 +300,13 @@ fn one(
     observer: &mut dyn Observer,
 ) -> Result<Done> {
     if let Action::Bless { .. } = options.action {
+        let mut plan = FilePlan::default();
+        manifest.add_inputs(&mut plan, false);
+        plan.writes("its golden image", manifest.golden(frame));
+        plan.check()?;
+        manifest.check_golden(frame)?;
+        session.load(frame, kind)?;
+        plan.check_scene(session.scene_files())?;
         let golden = bless::render(session, manifest, frame, kind, observer)?;
         session.check_validation()?;
         let outcome = Outcome::Blessed(bless::update(&golden)?);

@@ -1,5 +1,6 @@
 //! The device that frames are rendered on, and the renderer of the last one.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::golden::Golden;
@@ -9,7 +10,7 @@ use crate::film::Control;
 use crate::gpu::{Device, DeviceInfo, Options};
 use crate::output::Image;
 use crate::renderer::Renderer;
-use crate::scene::load;
+use crate::scene::load::{self, Confine, LoadOptions};
 use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
 
 /// Compiled pipelines that are kept from scene to scene: compiling is most of what small images cost on a CPU driver.
@@ -82,18 +83,27 @@ impl<'m> Session<'m> {
         image
     }
 
+    /// Loads the scene of a frame.
+    ///
+    /// # Errors
+    /// Those of [`load::load`].
+    pub fn load(&mut self, frame: &Frame, kind: TracerKind) -> Result<()> {
+        self.renderer(frame, kind).map(drop)
+    }
+
     fn renderer(&mut self, frame: &Frame, kind: TracerKind) -> Result<&mut Renderer> {
         let choice = match kind {
             TracerKind::Pipeline => TracerChoice::Pipeline,
             TracerKind::Query => TracerChoice::Query,
             TracerKind::Compute => TracerChoice::Compute,
         };
+        let confine = self.manifest.confine.as_deref().map_or(Confine::Nowhere, Confine::Folder);
         let open = match self.open.take() {
             Some(open) if open.scene == frame.scene && open.kind == kind => open,
             before => {
                 let scene = match before {
                     Some(open) if open.scene == frame.scene => open.renderer.into_scene(),
-                    _ => load::load(&self.manifest.scene(frame))?,
+                    _ => load::load_with(&self.manifest.scene(frame), &LoadOptions { confine, ..LoadOptions::default() })?,
                 };
                 let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
                 // the name that the manifest has: a golden image is the same whichever folder it was made in
@@ -102,6 +112,11 @@ impl<'m> Session<'m> {
             }
         };
         Ok(&mut self.open.insert(open).renderer)
+    }
+
+    /// The files of the scene of the last frame.
+    pub fn scene_files(&self) -> &[PathBuf] {
+        self.open.as_ref().map_or(&[], |open| &open.renderer.scene().report.files)
     }
 
     /// Fails if the validation layer, where it is on, has reported anything.

@@ -17,9 +17,13 @@ mod chosen;
 mod compare;
 mod compare_ao;
 mod config;
+#[cfg(unix)]
+mod confine;
 mod info;
 mod manners;
 mod outputs;
 mod program;
+#[cfg(unix)]
+mod replaced;
 mod sequences;
 mod stress;

@@ -16,3 +16,4 @@ mod memory;
 mod obj;
 mod own;
 mod shared;
+mod squares;

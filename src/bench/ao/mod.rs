@@ -34,6 +34,7 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(args);
     // before anything that takes long
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
+    args.common.check_inputs(&scenes.sources, None, None)?;
     let mut session = Session::start(args, &args.common, |device| AoBenchmark {
         host: device.host_info(),
         tracer: args.tracer.on(device.info()).0.name().to_owned(),

@@ -37,6 +37,7 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     // before anything that takes long
     let specs = if args.wants_peers() { file::choose(args.peers.as_deref(), Measures::Paths)? } else { Ok(Vec::new()) };
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
+    args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
     let mut session = Session::start(args, &args.common, |device| FramesBenchmark {
         host: device.host_info(),
         tracer: args.tracer.on(device.info()).0.name().to_owned(),

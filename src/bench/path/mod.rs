@@ -44,6 +44,7 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     // before anything that takes long
     let specs = file::choose(args.peers.as_deref(), Measures::Paths)?;
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
+    args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
     let mut session = Session::start(args, &args.common, |device| PathBenchmark {
         host: device.host_info(),
         tracer: args.tracer.on(device.info()).0.name().to_owned(),

@@ -51,6 +51,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
+    args.common.check_inputs(&scenes.sources, None, args.peers.as_deref())?;
     let mut session = Session::start(args, &args.common, |device| RayBenchmark {
         host: device.host_info(),
         repeats: args.repeats(),

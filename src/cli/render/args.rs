@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 
 use super::tev::TevAddress;
+use crate::cli::args::LoadArgs;
 use crate::cli::config::ConfigArgs;
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
+use crate::output::frames::FramePattern;
 use crate::output::settings::ExrCompression;
 use crate::output::{FileSettings, ImageFormat, apng};
 use crate::realtime::display::DisplayMode;
@@ -24,6 +27,9 @@ Examples:
   skylit render scene.glb -o path.png --integrator path --denoise   path tracing, denoised
   skylit render scene.glb -o ao.png --eye 3,2,5 --target 0,1,0      from here
   skylit render scene.glb -o turn.apng --preset balanced --orbit --frames 0..240     in real time";
+
+/// Frames whose files are compared with those that are read, and with each other, before anything is rendered: over an hour of film.
+const MAX_PLANNED_FRAMES: u32 = 100_000;
 
 /// `skylit render`.
 #[derive(Clone, Debug, Args)]
@@ -53,6 +59,9 @@ pub struct RenderArgs {
     /// Send the image to the viewer tev while it renders, at every power of two of samples; frames in real time one after another [default port: 14158]
     #[arg(long, value_name = "HOST[:PORT]", hide_short_help = true)]
     pub tev: Option<TevAddress>,
+    /// Files of the scene
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// How files are written
     #[command(flatten)]
     pub files: FileSettings,
@@ -95,7 +104,7 @@ impl RenderArgs {
     /// Those of [`RenderSettings::load`] and [`ConfigArgs::files`].
     pub fn with_files(&self) -> Result<(Self, Vec<DefaultsReport>)> {
         let settings = self.settings.over_file(self.settings_file.as_deref())?;
-        let files = self.config.files(Some(&self.scene))?;
+        let files = self.config.files(Some(&self.scene), self.load.options().confine)?;
         let is_frames = settings.realtime_setting().is_some();
         let holds = |settings: &RenderSettings| {
             let is_same_kind = settings.realtime_setting().is_some() == is_frames;
@@ -186,10 +195,48 @@ impl RenderArgs {
         }
     }
 
+    /// The files that it reads, as far as the command line tells, and those that it will write.
+    ///
+    /// # Errors
+    /// Those of [`FramePattern::of`], and [`Error::Usage`] for a file that would replace the one of `--resume` and is no image.
+    pub fn plan(&self, defaults: &[DefaultsReport]) -> Result<FilePlan> {
+        let (mut plan, settings) = (FilePlan::default(), &self.settings);
+
+        // what is read
+        plan.reads("the scene", &self.scene);
+        self.settings_file.iter().for_each(|path| plan.reads("--settings", path));
+        defaults.iter().for_each(|report| plan.reads("a file of defaults", &report.file));
+        settings.lighting.environment_file().iter().for_each(|path| plan.reads_images("--environment", path));
+        settings.frames.camera_path.iter().for_each(|path| plan.reads("--camera-path", path));
+
+        // what is written beside the image
+        self.depth_image.iter().for_each(|path| plan.writes("--depth-image", path));
+        self.dump_files().iter().for_each(|path| plan.writes("--dump-rays", path));
+        // an image may take the place of the one that it goes on from, and nothing else may
+        let mut beside = plan.clone();
+        settings.film.resume.iter().for_each(|path| beside.reads("--resume", path));
+        beside.check()?;
+
+        // images: one, or one a frame
+        let range = settings.frames.range();
+        let last = range.end.min(range.first.saturating_add(MAX_PLANNED_FRAMES));
+        let is_sequence = settings.realtime_setting().is_some() || settings.is_still_sequence();
+        for path in &self.output {
+            match FramePattern::of(path)?.filter(|_| is_sequence) {
+                Some(pattern) => (range.first..last).for_each(|n| plan.writes("-o", pattern.path(u64::from(n)))),
+                None => plan.writes("-o", path),
+            }
+        }
+        Ok(plan)
+    }
+
+    fn dump_files(&self) -> Vec<PathBuf> {
+        self.dump_rays.iter().flat_map(|p| [dump_path(p, "primary"), dump_path(p, "ao")]).collect()
+    }
+
     /// All files that will be written.
     pub fn outputs(&self) -> Vec<PathBuf> {
-        let dumps = self.dump_rays.iter().flat_map(|p| [dump_path(p, "primary"), dump_path(p, "ao")]);
-        self.output.iter().chain(&self.depth_image).cloned().chain(dumps).collect()
+        self.output.iter().chain(&self.depth_image).cloned().chain(self.dump_files()).collect()
     }
 }
 

@@ -16,6 +16,7 @@ use tev::{SendError, TevViewer};
 use super::config;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::plan::FilePlan;
 use crate::film::Control;
 use crate::integrators::aov::AovPixel;
 use crate::output::settings::PngEncoding;
@@ -32,16 +33,18 @@ use crate::terminal::progress::Progress;
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let (args, defaults) = &args.with_files()?;
     args.check()?;
+    let plan = &args.plan(defaults)?;
+    plan.check()?;
     config::report(args.verbosity.console(), defaults);
     match args.settings.realtime_setting() {
-        Some(_) => frames(args, defaults, start),
-        None if args.settings.is_still_sequence() => stills(args, defaults, start),
-        None => still(args, defaults, start),
+        Some(_) => frames(args, defaults, plan, start),
+        None if args.settings.is_still_sequence() => stills(args, defaults, plan, start),
+        None => still(args, defaults, plan, start),
     }
 }
 
 /// A still for each frame. A frame's files are written when it is finished, so a run that was ended goes on with `--continue`.
-fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
+fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
     timeline.check_outputs(&args.output)?;
     let range = timeline.range();
@@ -50,7 +53,8 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     files_of(range.first)?.iter().try_for_each(|path| files::check_writable(path))?;
     interrupt::install();
     let console = args.verbosity.console();
-    let mut renderer = Renderer::open(&args.scene, &args.device)?;
+    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    plan.check_scene(&renderer.scene().report.files)?;
     let mut stills = renderer.still_sequence(&args.settings)?;
     let mut progress = Progress::new("rendering frames", &console);
     let (mut records, mut warnings, mut finished) = (Vec::new(), Vec::new(), 0);
@@ -102,14 +106,15 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     console.close(&record, Ok(()))
 }
 
-fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
+fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start: Instant) -> Result<(), Failure> {
     for path in args.outputs() {
         files::check_writable(&path)?;
     }
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
-    let mut renderer = Renderer::open(&args.scene, &args.device)?;
+    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
     if args.files.background.is_some() && renderer.shows_environment(&args.settings)? {
         let what = "--background has no effect: the environment is behind the scene, in its colours; leave --background out, or render without an environment";
@@ -117,7 +122,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Resu
     }
     let intervals =
         crate::renderer::still::intervals(&args.settings, &renderer.scene().hints, args.settings.spp(renderer.scene()));
-    check_intervals(args, &intervals)?;
+    check_intervals(args, plan.clone(), &intervals, &renderer.scene().report.files)?;
     let mut control = CliControl::new(args, console);
     let extras = StillExtras {
         keep_rays: args.dump_rays.is_some(),
@@ -155,7 +160,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Resu
     console.close(&record, if interrupted { Err(Error::Interrupted) } else { Ok(()) })
 }
 
-fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
+fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
     // report invalid settings before anything is loaded
     crate::renderer::frames::frame_settings(&args.settings)?;
@@ -167,7 +172,8 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
-    let mut renderer = Renderer::open(&args.scene, &args.device)?;
+    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
     let mut control = CliControl::new(args, console);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
@@ -268,8 +274,13 @@ fn names(args: &RenderArgs) -> String {
     args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Checks before rendering starts that intermediate images can be written.
-fn check_intervals(args: &RenderArgs, intervals: &[u32]) -> Result<()> {
+/// Checks before rendering starts that intermediate images can be written, and take the place of no other file.
+fn check_intervals(args: &RenderArgs, mut plan: FilePlan, intervals: &[u32], scene_files: &[PathBuf]) -> Result<()> {
+    for path in &args.output {
+        intervals.iter().for_each(|&n| plan.writes("an intermediate image", interval_path(path, n)));
+    }
+    plan.check()?;
+    plan.check_scene(scene_files)?;
     let check = |path: &PathBuf| intervals.iter().try_for_each(|&n| files::check_writable(&interval_path(path, n)));
     args.output.iter().try_for_each(check)
 }

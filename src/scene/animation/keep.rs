@@ -16,13 +16,7 @@ impl AnimationRig {
 
     /// For each instance of `scene`, whether an animation moves it.
     pub(in crate::scene) fn moving(&self, scene: &Scene) -> Vec<bool> {
-        let mut moving = vec![false; scene.instances.len()];
-        for animation in 0..self.parts.animations.len() {
-            for i in self.motion(animation).unwrap_or_default().instances {
-                moving[i] = true;
-            }
-        }
-        moving
+        self.moving_instances(scene.instances.len())
     }
 
     /// For each mesh of `scene`, whether an animation deforms it.

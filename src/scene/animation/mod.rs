@@ -94,7 +94,7 @@ pub struct Skin {
 }
 
 /// The property of a node that a channel animates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Property {
     /// Translation; three numbers.
     Translation,

@@ -1,9 +1,11 @@
 //! Playback: what an animation changes, and the pose at a time.
 
+use std::collections::HashMap;
+
 use glam::{DAffine3, DVec3};
 
 use super::transform::{anchor, at_least};
-use super::{Animation, AnimationRig, Deformation, LocalTransform, Property, VertexData};
+use super::{Animation, AnimationRig, Channel, Deformation, LocalTransform, Property, VertexData};
 use crate::error::{Error, Result};
 use crate::scene::camera::rigid;
 use crate::scene::{Geometry, Motion, Scene};
@@ -57,8 +59,24 @@ struct Scratch {
     live: Vec<bool>,
     locals: Vec<LocalTransform>,
     world: Vec<DAffine3>,
-    joints: Vec<DAffine3>,
+    /// Joint matrices of each skin; none of one that nothing deforms by.
+    joints: Vec<Vec<DAffine3>>,
     weights: Vec<f64>,
+}
+
+/// What deforms meshes in an animation.
+struct Deforming<'a> {
+    /// Whether a joint of each skin moves.
+    skins: Vec<bool>,
+    /// Of nodes whose morph weights the animation has: the channel, and whether it changes them.
+    weights: HashMap<usize, (&'a Channel, bool)>,
+}
+
+impl Deforming<'_> {
+    fn deforms(&self, deformation: &Deformation) -> bool {
+        let morphs = || self.weights.get(&deformation.node).is_some_and(|(_, changes)| *changes);
+        deformation.skin.is_some_and(|s| self.skins[s]) || (!deformation.targets.is_empty() && morphs())
+    }
 }
 
 impl Pose {
@@ -98,7 +116,8 @@ impl AnimationRig {
         let mut live = Vec::new();
         self.live(animation, &mut live)?;
         let deformations = &self.parts.deformations;
-        let deform = |d: &&Deformation| self.deforms(animation, d, &live);
+        let deforming = self.what_deforms(animation, &live);
+        let deform = |d: &&Deformation| deforming.deforms(d);
         Ok(Motion {
             instances: self.moved(&self.parts.instances, &live).map(|(i, _)| i).collect(),
             meshes: deformations.iter().filter(deform).map(|d| d.mesh).collect(),
@@ -160,16 +179,20 @@ impl AnimationRig {
         pose.lights.extend(self.moved(&self.parts.lights, live).map(|(i, node)| (i, rigid(&world[node]))));
 
         let mut count = 0;
+        let deforming = self.what_deforms(animation, live);
+        joints.resize_with(self.parts.skins.len(), Vec::new);
+        joints.iter_mut().for_each(Vec::clear);
         for (d, deformation) in self.parts.deformations.iter().enumerate() {
-            if !self.deforms(animation, deformation, live) {
+            if !deforming.deforms(deformation) {
                 continue;
             }
             let Some(base) = self.shapes.get(d) else { continue };
             if pose.meshes.len() == count {
                 pose.meshes.push(PosedMesh::default());
             }
-            self.weights(deformation, Some((playing, seconds)), weights);
-            self.joints(deformation, world, joints);
+            let channel = deforming.weights.get(&deformation.node).map(|(channel, _)| *channel);
+            self.weights(deformation, channel.map(|c| (c, seconds)), weights);
+            let joints = self.joints(deformation, world, joints);
             pose.meshes[count].mesh = deformation.mesh;
             deformation.pose(base, weights, joints, false, &mut pose.meshes[count].shape);
             count += 1;
@@ -189,10 +212,29 @@ impl AnimationRig {
         for (channel, still) in playing.channels.iter().zip(&self.still[animation]) {
             live[channel.node] |= !still && channel.property != Property::Weights;
         }
+        self.spread(live);
+        Ok(playing)
+    }
+
+    /// Marks the nodes below those that are marked.
+    fn spread(&self, live: &mut [bool]) {
         for (i, node) in self.parts.nodes.iter().enumerate() {
             live[i] |= node.parent.is_some_and(|p| live[p]);
         }
-        Ok(playing)
+    }
+
+    /// For each instance of a scene of `count`, whether any animation moves it.
+    pub(super) fn moving_instances(&self, count: usize) -> Vec<bool> {
+        // at once for all animations: a file may have as many as nodes
+        let mut live = vec![false; self.parts.nodes.len()];
+        let channels = self.parts.animations.iter().zip(&self.still).flat_map(|(a, still)| a.channels.iter().zip(still));
+        for (channel, still) in channels {
+            live[channel.node] |= !still && channel.property != Property::Weights;
+        }
+        self.spread(&mut live);
+        let mut moving = vec![false; count];
+        self.moved(&self.parts.instances, &live).for_each(|(i, _)| moving[i] = true);
+        moving
     }
 
     /// The instances, cameras or lights on moving nodes, each with its node.
@@ -200,33 +242,35 @@ impl AnimationRig {
         carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
     }
 
-    fn deforms(&self, animation: usize, deformation: &Deformation, live: &[bool]) -> bool {
-        let skinned = deformation.skin.is_some_and(|s| self.parts.skins[s].joints.iter().any(|&j| live[j]));
-        let mut channels = self.parts.animations[animation].channels.iter().zip(&self.still[animation]);
-        let morphs = |c: &super::Channel| c.property == Property::Weights && c.node == deformation.node;
-        skinned || (!deformation.targets.is_empty() && channels.any(|(c, still)| !still && morphs(c)))
+    /// What deforms meshes in an animation that moves these nodes.
+    fn what_deforms(&self, animation: usize, live: &[bool]) -> Deforming<'_> {
+        let skins = self.parts.skins.iter().map(|skin| skin.joints.iter().any(|&j| live[j])).collect();
+        let channels = self.parts.animations[animation].channels.iter().zip(&self.still[animation]);
+        let weights = channels.filter(|(c, _)| c.property == Property::Weights).map(|(c, still)| (c.node, (c, !still)));
+        Deforming { skins, weights: weights.collect() }
     }
 
     /// Weights of a mesh's morph targets, animated or at rest.
-    fn weights(&self, deformation: &Deformation, playing: Option<(&Animation, f64)>, out: &mut Vec<f64>) {
+    fn weights(&self, deformation: &Deformation, playing: Option<(&Channel, f64)>, out: &mut Vec<f64>) {
         out.clear();
         out.extend(self.parts.nodes[deformation.node].weights.iter().map(|&w| f64::from(w)));
-        let Some((animation, seconds)) = playing.filter(|_| !deformation.targets.is_empty()) else { return };
-        let of = |c: &&super::Channel| c.property == Property::Weights && c.node == deformation.node;
-        if let Some(channel) = animation.channels.iter().rfind(of) {
+        if let Some((channel, seconds)) = playing.filter(|_| !deformation.targets.is_empty()) {
             channel.sampler.weights(seconds, out);
         }
     }
 
-    /// The joint matrices of a mesh's skin, given the nodes' world transforms.
-    fn joints(&self, deformation: &Deformation, world: &[DAffine3], out: &mut Vec<DAffine3>) {
-        out.clear();
-        let Some(skin) = deformation.skin else { return };
-        let (skin, anchor) = (&self.parts.skins[skin], self.anchor(skin));
-        out.extend(skin.joints.iter().zip(&skin.inverse_bind).map(|(&j, bind)| {
-            let near = DAffine3 { translation: world[j].translation - anchor, ..world[j] };
-            near * *bind
-        }));
+    /// The joint matrices of a mesh's skin, given the nodes' world transforms; none without a skin. Of each skin they are computed once: `known` has a place for each.
+    fn joints<'a>(&self, deformation: &Deformation, world: &[DAffine3], known: &'a mut [Vec<DAffine3>]) -> &'a [DAffine3] {
+        let Some(number) = deformation.skin else { return &[] };
+        let (skin, anchor) = (&self.parts.skins[number], self.anchor(number));
+        let out = &mut known[number];
+        if out.is_empty() {
+            out.extend(skin.joints.iter().zip(&skin.inverse_bind).map(|(&j, bind)| {
+                let near = DAffine3 { translation: world[j].translation - anchor, ..world[j] };
+                near * *bind
+            }));
+        }
+        out
     }
 
     /// World position of the instances of meshes with this skin.
@@ -242,22 +286,25 @@ impl AnimationRig {
     pub(in crate::scene) fn apply_rest_pose(scene: &mut Scene) {
         let Some(mut rig) = scene.rig.take() else { return };
         rig.shapes.clear();
-        let (mut weights, mut joints) = (Vec::new(), Vec::new());
+        let (mut weights, mut joints) = (Vec::new(), vec![Vec::new(); rig.parts.skins.len()]);
         for deformation in &rig.parts.deformations {
             // other geometry was refused when the rig was made
             let Geometry::Triangles(t) = &mut scene.meshes[deformation.mesh].geometry else { continue };
             let base = VertexData::take(t);
             rig.weights(deformation, None, &mut weights);
-            rig.joints(deformation, &rig.rest, &mut joints);
+            let joints = rig.joints(deformation, &rig.rest, &mut joints);
             let mut shape = VertexData::default();
-            deformation.pose(&base, &weights, &joints, true, &mut shape);
+            deformation.pose(&base, &weights, joints, true, &mut shape);
             shape.give(t);
             rig.shapes.push(base);
         }
-        for deformation in &rig.parts.deformations {
-            let Some(skin) = deformation.skin else { continue };
-            let at = DAffine3::from_translation(rig.anchor(skin));
-            scene.instances.iter_mut().filter(|i| i.mesh == deformation.mesh).for_each(|i| i.object_to_world = at);
+        // instances of meshes with skins
+        let skinned = rig.parts.deformations.iter().filter_map(|d| Some((d.mesh, rig.anchor(d.skin?))));
+        let places: HashMap<usize, DVec3> = skinned.collect();
+        for instance in &mut scene.instances {
+            if let Some(at) = places.get(&instance.mesh) {
+                instance.object_to_world = DAffine3::from_translation(*at);
+            }
         }
         let (moving, deforming) = (rig.moving(scene), rig.deforming(scene));
         let place = |rig: &Self, scene: &mut Scene| {

@@ -4,7 +4,7 @@ mod rig;
 
 use std::collections::BTreeSet;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
@@ -65,6 +65,39 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
     }
     write_buffered(path, |out| out.write_all(text.as_bytes()))?;
     Ok(written)
+}
+
+/// What files of this program say that has written them.
+const GENERATOR: &str = concat!("skylit ", env!("CARGO_PKG_VERSION"));
+
+/// The files that [`export_gltf`] writes beside a `.gltf`; none for another extension.
+pub fn companions(scene: &Scene, path: &Path) -> Vec<PathBuf> {
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+        return Vec::new();
+    }
+    let mut pixels: Vec<&TexelData> = Vec::new();
+    for texture in &scene.textures {
+        if !pixels.iter().any(|p| p.is_shared_with(&texture.texels)) {
+            pixels.push(&texture.texels);
+        }
+    }
+    let images = (0..pixels.len()).map(|k| path.with_file_name(image_name(path, k)));
+    std::iter::once(path.with_extension("bin")).chain(images).collect()
+}
+
+/// Whether a file beside `gltf` belongs to it, and an earlier export has written both.
+pub fn is_companion_of(path: &Path, gltf: &Path) -> bool {
+    let Ok(text) = crate::files::read_regular(gltf) else { return false };
+    let Ok(json) = serde_json::from_slice::<Value>(&text) else { return false };
+    let uri = encode(&path.file_name().unwrap_or_default().to_string_lossy());
+    let is_own = json["asset"]["generator"].as_str().is_some_and(|g| g.split(' ').next() == GENERATOR.split(' ').next());
+    let names = |key: &str| json[key].as_array().into_iter().flatten().any(|file| file["uri"].as_str() == Some(&uri));
+    is_own && (names("buffers") || names("images"))
+}
+
+/// The name of an image beside a `.gltf`.
+fn image_name(path: &Path, index: usize) -> String {
+    format!("{}_{index}.png", path.file_stem().unwrap_or_default().to_string_lossy())
 }
 
 /// JSON arrays.
@@ -170,7 +203,7 @@ impl Writer {
         }
 
         let mut json = json!({
-            "asset": { "version": "2.0", "generator": concat!("skylit ", env!("CARGO_PKG_VERSION")) },
+            "asset": { "version": "2.0", "generator": GENERATOR },
             "scene": 0,
         });
         let mut put = |key: &str, values: Vec<Value>| {
@@ -296,8 +329,7 @@ impl Writer {
                     if self.embed {
                         image["bufferView"] = json!(self.view(&png, None));
                     } else {
-                        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-                        let name = format!("{stem}_{}.png", images.len());
+                        let name = image_name(path, images.len());
                         image["uri"] = json!(encode(&name));
                         self.images.push((name, png));
                     }

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use super::text;
+use super::{LoadOptions, confine, text};
+use crate::error::{Error, Result as LoadResult};
 
 /// Number of parent folders to search above the referencing file's folder.
 const ANCESTORS: usize = 3;
@@ -13,13 +14,44 @@ const ANCESTORS: usize = 3;
 const MAX_PARTS: usize = 4;
 
 /// Searches folders, which it lists once each.
-#[derive(Default)]
 pub(super) struct Finder {
+    /// The folder without links that files have to lie below.
+    confine: Option<PathBuf>,
+    /// The first name that leads out of it.
+    refused: Option<String>,
     /// Of each folder that was listed: its entries by their names in lower case, sorted.
     listings: HashMap<PathBuf, HashMap<String, Vec<OsString>>>,
 }
 
 impl Finder {
+    /// Nothing listed yet.
+    pub(super) fn new(options: &LoadOptions) -> Self {
+        Self { confine: options.confine.folder().map(Path::to_owned), refused: None, listings: HashMap::new() }
+    }
+
+    /// Fails if a name leads out of the folder that files have to lie below.
+    ///
+    /// # Errors
+    /// [`Error::Input`] about `file`, which has the name.
+    pub(super) fn check(&self, file: &Path) -> LoadResult<()> {
+        self.refused.as_ref().map_or(Ok(()), |name| Err(Error::input(file, confine::refusal(&text::shown(name)))))
+    }
+
+    /// The path to open of a file that was found; none of one that lies elsewhere.
+    fn admit(&self, path: PathBuf) -> Option<PathBuf> {
+        match &self.confine {
+            Some(folder) => confine::below(folder, &path),
+            None => Some(path),
+        }
+    }
+
+    /// Whether a name that nothing was found for means a file elsewhere.
+    fn is_outside(&self, spellings: &[Vec<u8>], own: &[PathBuf]) -> bool {
+        let Some(confine) = &self.confine else { return false };
+        let leaves = |folder: &PathBuf| spellings.iter().any(|name| confine::leaves(confine, folder, &text::path(name)));
+        own.iter().any(leaves)
+    }
+
     /// Looks for a file that is referred to as one of `names` (texts of [`text`]), by the files in `beside`. The first that
     /// exists wins, of these:
     ///
@@ -35,8 +67,14 @@ impl Finder {
         let (mut folders, mut own) = (Vec::new(), Vec::new());
         for file in beside {
             // absolute, because "scene.obj" has no ancestors to climb to
-            let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
-            for (above, folder) in file.ancestors().skip(1).take(1 + ANCESTORS).enumerate() {
+            let mut file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
+            if self.confine.is_some() {
+                let folder = std::fs::canonicalize(crate::files::folder_of(&file)).unwrap_or_default();
+                file = folder.join(file.file_name().unwrap_or_default());
+            }
+            let may = |folder: &Path| self.confine.as_ref().is_none_or(|confine| folder.starts_with(confine));
+            let above = file.ancestors().skip(1).take(1 + ANCESTORS).enumerate();
+            for (above, folder) in above.filter(|(_, folder)| may(folder)) {
                 if !folders.iter().any(|f| f == folder) {
                     folders.push(folder.to_owned());
                 }
@@ -51,7 +89,7 @@ impl Finder {
             models.extend([spelling, other]);
         }
         let exact = folders.iter().flat_map(|folder| models.iter().map(move |name| folder.join(name)));
-        if let Some(found) = exact.into_iter().find(|p| p.is_file()) {
+        if let Some(found) = exact.filter(|p| p.is_file()).find_map(|p| self.admit(p)) {
             return Ok(found);
         }
         for folder in &folders {
@@ -70,6 +108,9 @@ impl Finder {
                 }
             }
         }
+        if self.is_outside(&spellings, &own) {
+            self.refused.get_or_insert_with(|| names.first().copied().unwrap_or_default().to_owned());
+        }
         Err(folders)
     }
 
@@ -78,7 +119,7 @@ impl Finder {
         use std::path::Component;
         let exact = folder.join(name);
         if exact.is_file() {
-            return Some(exact);
+            return self.admit(exact);
         }
         let mut path = folder.to_owned();
         for component in name.components() {
@@ -86,14 +127,16 @@ impl Finder {
                 Component::CurDir => {}
                 Component::ParentDir => path.push(".."),
                 Component::Normal(part) if path.join(part).exists() => path.push(part),
+                // folders elsewhere are not listed
                 Component::Normal(part) => {
+                    path = self.admit(path)?;
                     let entry = self.listing(&path).get(&lower_case(part))?.first()?;
                     path.push(entry);
                 }
                 Component::RootDir | Component::Prefix(_) => return None,
             }
         }
-        path.is_file().then_some(path)
+        if path.is_file() { self.admit(path) } else { None }
     }
 
     fn listing(&mut self, folder: &Path) -> &HashMap<String, Vec<OsString>> {

@@ -3,6 +3,7 @@
 mod brhan;
 mod camera_path;
 mod compact;
+pub mod confine;
 mod environment;
 mod find;
 mod finish;
@@ -15,10 +16,11 @@ mod tangents;
 mod text;
 mod warnings;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 pub use camera_path::load_camera_path;
+pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
 
 use crate::error::{Error, Result};
@@ -32,6 +34,8 @@ pub struct LoadOptions<'a> {
     pub textures: bool,
     /// Called after each image that was decoded, from several threads.
     pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
+    /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are not opened.
+    pub confine: Confine<'a>,
 }
 
 /// Images decoded so far.
@@ -45,7 +49,7 @@ pub struct ImagesDecoded {
 
 impl Default for LoadOptions<'_> {
     fn default() -> Self {
-        Self { textures: true, progress: &|_| () }
+        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere }
     }
 }
 
@@ -87,6 +91,14 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
         }
     }
     load_file_with(path, options)
+}
+
+/// The files that a scene is read from: models, materials, buffers and images, also those that cannot be read. None of a built-in one.
+///
+/// # Errors
+/// As [`load`].
+pub fn files_of(source: &str) -> Result<Vec<PathBuf>> {
+    Ok(load_with(source, &LoadOptions { textures: false, ..Default::default() })?.report.files)
 }
 
 /// Whether a path has the extension of a scene file; it need not exist.
@@ -135,8 +147,10 @@ impl Drop for InProgress {
 
 fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let _in_progress = InProgress::begin();
+    let folder = options.confine.folder_for(path)?;
+    let confine = folder.as_deref().map_or(Confine::Nowhere, Confine::Folder);
     let budget = Budget::default();
-    let outcome = read(path, Loading { options: *options, budget: &budget });
+    let outcome = read(path, Loading { options: LoadOptions { confine, ..*options }, budget: &budget });
     // for which readers have other errors, or warnings
     budget.check().map_err(|e| e.of(path))?;
     let mut scene = outcome?;

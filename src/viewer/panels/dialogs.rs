@@ -7,6 +7,7 @@ use std::task::Poll;
 use egui::{Align2, Context, Key, Ui};
 
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::viewer::app::{App, Dialog, RenderedMotion, Second};
 use crate::viewer::browse::Browsing;
 use crate::viewer::request::Task;
@@ -123,6 +124,16 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
 }
 
 fn act(app: &mut App, dialog: Dialog) {
+    if let Dialog::Save(text) | Dialog::SaveSettings(text) | Dialog::Render(text, _) = &dialog
+        && let Some(scene) = &app.scene
+    {
+        let mut plan = FilePlan::default();
+        plan.writes("what is saved", text.trim());
+        if let Err(e) = plan.check_scene(&scene.files) {
+            app.report(e.to_string(), true);
+            return;
+        }
+    }
     match dialog {
         Dialog::Open(text) if text.trim().is_empty() => {}
         Dialog::Open(text) => app.open_file(text.trim()),

@@ -122,7 +122,7 @@ impl Job {
                 self.events.send(Event::Loading(format!("loading {name}: {}{of} images", images.done), share));
             }
         };
-        load::load_with(&self.source, &LoadOptions { textures, progress: &progress })
+        load::load_with(&self.source, &LoadOptions { textures, progress: &progress, ..Default::default() })
     }
 
     fn send(&self, part: Result<Loaded>) {

@@ -26,7 +26,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let text = text::decode(&bytes);
     let wrong = |e: String| Error::input(path, text::shown(&e));
     let statements = parse::statements(&text).map_err(wrong)?;
-    let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::default());
+    let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::new(&loading.options));
     let mut loader = Loader { path, loading, scene, models, finder };
     for mut statement in statements {
         loader.statement(&mut statement)?;
@@ -134,7 +134,9 @@ impl Loader<'_> {
         let file = s.need("file").map_err(here)?;
         let to_world = transform(s).map_err(here)?;
         let material = material(s).map_err(here)?;
-        let found = self.finder.find(&[file], &[self.path]).map_err(|searched| {
+        let found = self.finder.find(&[file], &[self.path]);
+        self.finder.check(self.path)?;
+        let found = found.map_err(|searched| {
             let searched = find::list(&searched);
             here(format!("line {}: the model {file} does not exist; searched in {searched}", s.line))
         })?;

@@ -1,6 +1,6 @@
 //! Reading of animations.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
 use ::gltf::json::Index;
@@ -62,6 +62,7 @@ pub(super) fn read(
     for (a, animation) in animations.iter().enumerate() {
         let name = animation.name.clone().unwrap_or_default();
         let mut channels: Vec<Channel> = Vec::new();
+        let mut targets = HashSet::new();
         for (c, channel) in animation.channels.iter().enumerate() {
             let mut repairs = Vec::new();
             let channel = read_channel(reader, animation, channel, nodes, index, &mut times, &mut repairs);
@@ -70,7 +71,7 @@ pub(super) fn read(
             }
             let mut leave_out = |e: String| warn(format!("animation {a} `{name}`, channel {c}: {e}: left out"));
             match channel {
-                Ok(Some(channel)) if channels.iter().any(|k| (k.node, k.property) == (channel.node, channel.property)) => {
+                Ok(Some(channel)) if !targets.insert((channel.node, channel.property)) => {
                     leave_out("another channel has the same target".to_owned());
                 }
                 Ok(channel) => channels.extend(channel),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::node::Doubles;
 use super::uri::{self, Uri};
 use crate::error::{Error, Result};
-use crate::memory::Budget;
+use crate::scene::load::{Loading, confine};
 
 /// A file's JSON and, in a `.glb`, the binary chunk.
 pub(super) struct Chunks<'a> {
@@ -155,16 +155,17 @@ fn lenient(text: &[u8]) -> Option<Root> {
 ///
 /// # Errors
 /// The reason in words, with the path that was tried.
-pub(super) fn read_uri(uri: &str, gltf: &Path, budget: &Budget) -> Result<Vec<u8>, String> {
+pub(super) fn read_uri(uri: &str, gltf: &Path, loading: Loading) -> Result<Vec<u8>, String> {
     match uri::parse(uri)? {
         Uri::Data(bytes) => Ok(bytes),
         Uri::Paths(paths) => {
-            let file = uri::resolve(&paths, folder(gltf));
+            let confine = loading.options.confine.folder();
+            let file = uri::resolve(&paths, folder(gltf), confine).ok_or_else(|| confine::refusal(uri))?;
             let bytes = crate::files::read_regular(&file).map_err(|e| match Error::read(&file, &e) {
                 Error::Input { path, message } => format!("{}: {message}", path.display()),
                 other => other.to_string(),
             })?;
-            budget.read(bytes.len());
+            loading.budget.read(bytes.len());
             Ok(bytes)
         }
     }
@@ -175,24 +176,27 @@ fn folder(gltf: &Path) -> &Path {
 }
 
 /// The files beside the glTF file that its buffers and images are in.
-pub(super) fn files(document: &Root, gltf: &Path) -> Vec<PathBuf> {
+///
+/// # Errors
+/// [`Error::Input`] for one that does not lie below `confine`.
+pub(super) fn files(document: &Root, gltf: &Path, confine: Option<&Path>) -> Result<Vec<PathBuf>> {
     let uris = document.buffers.iter().map(|b| &b.uri).chain(document.images.iter().map(|i| &i.uri)).flatten();
-    let mut files: Vec<_> = uris
-        .filter(|uri| !uri::is_data(uri))
-        .filter_map(|uri| match uri::parse(uri) {
-            Ok(Uri::Paths(paths)) => Some(uri::resolve(&paths, folder(gltf))),
-            _ => None,
-        })
-        .collect();
+    let mut files = Vec::new();
+    for uri in uris.filter(|uri| !uri::is_data(uri)) {
+        if let Ok(Uri::Paths(paths)) = uri::parse(uri) {
+            let file = uri::resolve(&paths, folder(gltf), confine);
+            files.push(file.ok_or_else(|| Error::input(gltf, confine::refusal(uri)))?);
+        }
+    }
     files.dedup();
-    files
+    Ok(files)
 }
 
 /// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for whoever needs it.
 pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
 
 /// The bytes of every buffer that a buffer view refers to; others are not read.
-pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, budget: &Budget) -> Vec<BufferBytes<'a>> {
+pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, loading: Loading) -> Vec<BufferBytes<'a>> {
     let mut used = vec![false; document.buffers.len()];
     for view in &document.buffer_views {
         if let Some(used) = used.get_mut(view.buffer.value()) {
@@ -200,7 +204,7 @@ pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, b
         }
     }
     let read = |(i, buffer): (usize, &Buffer)| match used[i] {
-        true => read_buffer(i, buffer, bin, path, budget).map_err(|e| format!("buffer {i} {e}")),
+        true => read_buffer(i, buffer, bin, path, loading).map_err(|e| format!("buffer {i} {e}")),
         false => Err(format!("buffer {i} is not used by a buffer view")),
     };
     document.buffers.iter().enumerate().map(read).collect()
@@ -214,10 +218,10 @@ fn read_buffer<'a>(
     buffer: &Buffer,
     bin: Option<&'a [u8]>,
     path: &Path,
-    budget: &Budget,
+    loading: Loading,
 ) -> std::result::Result<Cow<'a, [u8]>, String> {
     let bytes: Cow<'a, [u8]> = match (&buffer.uri, bin) {
-        (Some(uri), _) => read_uri(uri, path, budget).map(Cow::Owned).map_err(|e| format!("cannot be read: {e}"))?,
+        (Some(uri), _) => read_uri(uri, path, loading).map(Cow::Owned).map_err(|e| format!("cannot be read: {e}"))?,
         (None, Some(bin)) if index == 0 => bin.into(),
         (None, _) => {
             let others = buffer.extensions.as_ref().map(|e| &e.others);

@@ -18,7 +18,7 @@ mod skin;
 mod texture;
 mod uri;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use ::gltf::json::accessor::Accessor;
@@ -73,9 +73,9 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let (document, doubles) = container::document(&chunks.json, path)?;
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
-    let buffers = container::buffers(&document, chunks.bin, path, budget);
+    scene.report.files = container::files(&document, path, loading.options.confine.folder())?;
+    let buffers = container::buffers(&document, chunks.bin, path, loading);
     let reader = Reader { document: &document, buffers: &buffers, budget };
-    scene.report.files = container::files(&document, path);
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();
@@ -136,9 +136,10 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
         };
         return Err(Error::input(path, format!("requires the extension {name}, which skylit does not support: {remedy}")));
     }
+    let required: HashSet<&String> = document.extensions_required.iter().collect();
     scene.report.extensions.extend(document.extensions_used.iter().map(|name| FileExtension {
         name: name.clone(),
-        required: document.extensions_required.contains(name),
+        required: required.contains(name),
         ignored: !KNOWN.contains(&name.as_str()),
     }));
     for name in document.extensions_used.iter().filter(|n| !KNOWN.contains(&n.as_str())) {

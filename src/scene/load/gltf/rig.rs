@@ -52,6 +52,8 @@ pub(super) struct RigBuilder<'a> {
     moves: Vec<bool>,
     morphs: Vec<bool>,
     skins: BTreeMap<usize, Skin>,
+    /// Of skins that deform a mesh: whether an animation moves a joint, and the matrices of the joints at rest.
+    rests: BTreeMap<usize, (bool, Vec<DAffine3>)>,
     deformations: Vec<Deformation>,
     /// The placed node of each instance of the scene; `None` for skinned meshes.
     pub instances: Vec<Option<usize>>,
@@ -112,6 +114,7 @@ impl<'a> RigBuilder<'a> {
             moves,
             morphs,
             skins: BTreeMap::new(),
+            rests: BTreeMap::new(),
             deformations: Vec::new(),
             instances: Vec::new(),
             cameras: Vec::new(),
@@ -181,22 +184,29 @@ impl<'a> RigBuilder<'a> {
     ) -> Option<DVec3> {
         let skin = made.skin.map(|s| &self.skins[&s]);
         let place = skin.and_then(|s| Some(anchor(&self.placed[*s.joints.first()?].to_world)));
+        // once for all meshes of a skin
+        let (placed, moves) = (self.placed, &self.moves);
+        let rest = made.skin.zip(skin).zip(place).map(|((number, skin), place)| {
+            &*self.rests.entry(number).or_insert_with(|| {
+                let joint = |(&j, bind): (&usize, &DAffine3)| {
+                    let to_world = placed[j].to_world;
+                    DAffine3 { translation: to_world.translation - place, ..to_world } * *bind
+                };
+                let joints = skin.joints.iter().zip(&skin.inverse_bind).map(joint).collect();
+                (skin.joints.iter().any(|&j| moves[j]), joints)
+            })
+        });
         let weights: Vec<f64> = self.nodes[made.node].weights.iter().map(|w| f64::from(*w)).collect();
         let animated = matches!(wanted.weights, Weights::Animated(_)) && !made.targets.is_empty();
         if !animated && !made.targets.is_empty() {
             let targets = std::mem::take(&mut made.targets);
             repose(&Deformation { targets, ..Deformation::default() }, &weights, &[], triangles);
         }
-        if animated || skin.is_some_and(|s| s.joints.iter().any(|&j| self.moves[j])) {
+        if animated || rest.is_some_and(|(moves, _)| *moves) {
             made.mesh = mesh;
             self.deformations.push(made);
-        } else if let (Some(skin), Some(place)) = (skin, place) {
-            let joint = |(&j, bind): (&usize, &DAffine3)| {
-                let to_world = self.placed[j].to_world;
-                DAffine3 { translation: to_world.translation - place, ..to_world } * *bind
-            };
-            let joints: Vec<DAffine3> = skin.joints.iter().zip(&skin.inverse_bind).map(joint).collect();
-            repose(&made, &weights, &joints, triangles);
+        } else if let Some((_, joints)) = rest {
+            repose(&made, &weights, joints, triangles);
         }
         place
     }

@@ -46,7 +46,7 @@ pub(super) fn resolve(
     wanted.retain(|i| same[i] == *i);
     let (count, done) = (wanted.len(), AtomicUsize::new(0));
     let decode = |i: usize| {
-        let decoded = image(reader, path, i);
+        let decoded = image(reader, path, loading, i);
         (options.progress)(ImagesDecoded { done: 1 + done.fetch_add(1, Ordering::Relaxed), of: Some(count) });
         (i, decoded)
     };
@@ -95,12 +95,12 @@ pub(super) fn resolve(
     (textures, skipped)
 }
 
-fn image(reader: &Reader, path: &Path, index: usize) -> Result<DecodedImage, String> {
+fn image(reader: &Reader, path: &Path, loading: Loading, index: usize) -> Result<DecodedImage, String> {
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
         (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name), reader.budget),
         (Some(file), None) => {
-            let bytes = container::read_uri(file, path, reader.budget).map_err(|e| format!("cannot be read ({e})"))?;
+            let bytes = container::read_uri(file, path, loading).map_err(|e| format!("cannot be read ({e})"))?;
             let name = if uri::is_data(file) { text(&image.name) } else { file };
             picture::decode(&bytes, name, reader.budget)
         }

@@ -7,6 +7,8 @@ use base64::Engine;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
+use crate::scene::load::confine;
+
 /// What a URI stands for.
 pub(super) enum Uri {
     /// The bytes of a data URI.
@@ -93,11 +95,21 @@ fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
     Ok(paths)
 }
 
-/// The first of the paths that is a file in `folder`; the first of all if none is.
-pub(super) fn resolve(paths: &[PathBuf], folder: &Path) -> PathBuf {
+/// The first of the paths that is a file in `folder`; the first of all if none is. `confine`: the folder without links that files have to lie below.
+/// `None` where a file elsewhere is meant.
+pub(super) fn resolve(paths: &[PathBuf], folder: &Path, confine: Option<&Path>) -> Option<PathBuf> {
+    if let Some(confine) = confine {
+        let from = std::fs::canonicalize(folder.join(".")).ok()?;
+        let may = |path: &&PathBuf| !confine::leaves(confine, &from, path);
+        let found = paths.iter().filter(may).find_map(|path| confine::below(confine, &from.join(path)).filter(|p| p.is_file()));
+        if found.is_some() || !paths.iter().all(|path| may(&path)) {
+            return found;
+        }
+        return paths.first().map(|path| folder.join(path));
+    }
     let mut joined = paths.iter().map(|path| folder.join(path));
     let found = joined.clone().find(|path| path.is_file());
-    found.or_else(|| joined.next()).unwrap_or_else(|| folder.to_owned())
+    Some(found.or_else(|| joined.next()).unwrap_or_else(|| folder.to_owned()))
 }
 
 /// Base64 of the standard alphabet, without the line breaks of e-mails, of what may be of the alphabet for URLs.

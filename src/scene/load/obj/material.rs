@@ -47,6 +47,14 @@ impl<'a> MaterialLibrary<'a> {
         self.textures.finder.find(names, &[obj])
     }
 
+    /// Fails if a name leads out of the folder that files have to lie below ([`LoadOptions::confine`]).
+    ///
+    /// # Errors
+    /// [`Error::Input`].
+    pub(super) fn check(&self, obj: &Path) -> Result<()> {
+        self.textures.finder.check(obj)
+    }
+
     /// The material that a model calls `name`: the one of just that name if there is one.
     pub(super) fn get(&self, name: &str) -> Option<usize> {
         let exact = text::uncommented(name).find_map(|name| self.exact.get(name));

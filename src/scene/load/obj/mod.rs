@@ -38,6 +38,12 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     if file.open_faces > 0 {
         scene.report.warnings.push(format!("{} faces with fewer than three corners: left out", file.open_faces));
     }
+    if file.large_polygons > 0 {
+        let (count, most) = (file.large_polygons, polygon::MAX_CORNERS);
+        scene.report.warnings.push(format!(
+            "{count} polygons have more than {most} corners: filled from their first corner as if they were convex; triangulate them in the modelling program"
+        ));
+    }
     if file.decimal_commas > 0 {
         scene.report.warnings.push(format!("{} numbers have a decimal comma: read as a point", file.decimal_commas));
     }
@@ -45,6 +51,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     // materials
     let mut materials = MaterialLibrary::new(loading);
     let is_complete = read_libraries(&file, path, &mut materials, &mut scene)?;
+    materials.check(path)?;
     let mut grey = None;
     let mut unknown: HashMap<String, usize> = HashMap::new();
 

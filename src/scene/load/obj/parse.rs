@@ -5,7 +5,7 @@ use std::str::SplitAsciiWhitespace;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use super::polygon::PolygonTriangulator;
+use super::polygon::{self, PolygonTriangulator};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::load::text::{self, Lines, trim};
@@ -45,6 +45,8 @@ pub(super) struct ObjFile {
     pub groups: Vec<Group>,
     /// Faces of fewer than three corners, which are left out.
     pub open_faces: usize,
+    /// Number of polygons of more corners than are cut.
+    pub large_polygons: usize,
     /// Numbers with a decimal comma.
     pub decimal_commas: usize,
 }
@@ -186,6 +188,7 @@ impl Parser {
             if group.smoothing.last().map_or(0, |s| s.1) != self.smoothing {
                 group.smoothing.push((group.triangles.len() as u32, self.smoothing));
             }
+            self.file.large_polygons += usize::from(self.polygon.len() > polygon::MAX_CORNERS);
             let (polygon, positions) = (&self.polygon, &self.file.positions);
             match self.cutter.cut(polygon.iter().map(|c| positions[c.position as usize])) {
                 Some(triangles) => group.triangles.extend(triangles.map(|t| t.map(|i| polygon[i]))),

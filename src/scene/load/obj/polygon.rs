@@ -3,6 +3,9 @@
 use earcut::Earcut;
 use glam::DVec3;
 
+/// Most corners of a polygon that is cut. Of one that crosses itself cutting costs the square of its corners: a second for so many.
+pub(super) const MAX_CORNERS: usize = 10_000;
+
 /// Cuts concave polygons; keeps its buffers from one to the next.
 #[derive(Default)]
 pub(super) struct PolygonTriangulator {
@@ -14,9 +17,12 @@ pub(super) struct PolygonTriangulator {
 impl PolygonTriangulator {
     /// The triangles of a polygon of finite corners that no fan from its first corner can fill, as indices of corners and
     /// with the polygon's orientation. `None` where the fan is right, or nothing is: the polygon is a triangle, convex, a
-    /// quad whose fan starts at the dent, or has no area.
+    /// quad whose fan starts at the dent, has no area, or more than [`MAX_CORNERS`].
     pub(super) fn cut(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<impl Iterator<Item = [usize; 3]>> {
         self.project(corners)?;
+        if self.points.len() > MAX_CORNERS {
+            return None;
+        }
         let area = |[a, b, c]: [[f64; 2]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let points = &self.points;
         if points[1..].windows(2).all(|w| area([points[0], w[0], w[1]]) >= 0.0) {

@@ -39,7 +39,7 @@ impl<'a> Textures<'a> {
     /// No texture yet.
     pub(super) fn new(loading: Loading<'a>) -> Self {
         let (pictures, textures) = (HashMap::new(), HashMap::new());
-        Self { loading, finder: Finder::default(), pictures, textures, missing: HashSet::new() }
+        Self { loading, finder: Finder::new(&loading.options), pictures, textures, missing: HashSet::new() }
     }
 
     /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can be read.

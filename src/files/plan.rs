@@ -1,0 +1,224 @@
+//! Which files a command reads and which it will write: no output takes the place of an input, or of another output.
+//!
+//! Files are compared by what they are, not by how they are spelled: `a.png` and `./a.png`, a link and what it points to, and two hard links to one file are the same.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{folder_of, link_target};
+use crate::error::{Error, Result};
+
+/// The files of a command.
+///
+/// ```
+/// use skylit::files::plan::FilePlan;
+///
+/// let mut plan = FilePlan::default();
+/// plan.reads("the scene", "scene.glb");
+/// plan.writes("-o", "image.png");
+/// plan.check()?;
+/// plan.writes("--depth-image", "./image.png");
+/// assert!(plan.check().is_err());
+/// # Ok::<(), skylit::Error>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct FilePlan {
+    outputs: Vec<(String, PathBuf)>,
+    inputs: Vec<(String, PathBuf)>,
+}
+
+/// What a file is, however it is spelled.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Identity {
+    /// Device and number of a file that exists.
+    #[cfg(unix)]
+    Inode(u64, u64),
+    /// The path without links of a file that exists, where files have no numbers.
+    #[cfg(not(unix))]
+    Existing(PathBuf),
+    /// The path without links that a new file will have, in lower case: file systems that ignore case have one such file.
+    New(String),
+}
+
+impl Identity {
+    /// `None` for a device, FIFO or socket, which is written to and not replaced.
+    fn of(path: &Path) -> Option<Self> {
+        match fs::metadata(path) {
+            Ok(found) if !found.is_file() && !found.is_dir() => None,
+            #[cfg(unix)]
+            Ok(found) => {
+                use std::os::unix::fs::MetadataExt;
+                Some(Self::Inode(found.dev(), found.ino()))
+            }
+            #[cfg(not(unix))]
+            Ok(_) => Some(Self::Existing(fs::canonicalize(path).ok()?)),
+            Err(_) => {
+                let path = link_target(path).unwrap_or_else(|_| path.to_owned());
+                let folder = folder_of(&path);
+                let folder = fs::canonicalize(folder).or_else(|_| std::path::absolute(folder)).ok()?;
+                Some(Self::New(folder.join(path.file_name()?).to_string_lossy().to_lowercase()))
+            }
+        }
+    }
+
+    fn of_existing(path: &Path) -> Option<Self> {
+        Self::of(path).filter(|identity| !matches!(identity, Self::New(_)))
+    }
+}
+
+impl FilePlan {
+    /// Adds a file that is read; `role` says in a message what it is: `the scene`, `--baseline`. What does not exist does not count.
+    pub fn reads(&mut self, role: &str, path: impl AsRef<Path>) {
+        self.inputs.push((role.to_owned(), path.as_ref().to_owned()));
+    }
+
+    /// Adds an image that is read, or all files of a folder of images.
+    pub fn reads_images(&mut self, role: &str, path: impl AsRef<Path>) {
+        let path = path.as_ref();
+        match path.is_dir() {
+            true => fs::read_dir(path).into_iter().flatten().flatten().for_each(|file| self.reads(role, file.path())),
+            false => self.reads(role, path),
+        }
+    }
+
+    /// Adds a file that will be written, by the option that names it.
+    pub fn writes(&mut self, option: &str, path: impl AsRef<Path>) {
+        self.outputs.push((option.to_owned(), path.as_ref().to_owned()));
+    }
+
+    /// Adds the page of a report that will be written into a folder.
+    pub fn writes_report(&mut self, option: &str, folder: impl AsRef<Path>) {
+        self.writes(option, folder.as_ref().join("index.html"));
+    }
+
+    /// Whether a file that will be written exists already. None that does not can replace an input.
+    pub fn replaces_files(&self) -> bool {
+        self.outputs.iter().any(|(_, path)| path.is_file())
+    }
+
+    /// Fails if an output would replace an input, or another output.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming both.
+    pub fn check(&self) -> Result<()> {
+        let mut outputs: HashMap<Identity, (&str, &Path)> = HashMap::new();
+        for (option, path) in &self.outputs {
+            let Some(identity) = Identity::of(path) else { continue };
+            if let Some((other, same)) = outputs.insert(identity, (option, path)) {
+                let spelled = spelled(path, same);
+                let who = if other == option { format!("{option} is given twice") } else { format!("{other} and {option}") };
+                let message =
+                    format!("{}: two outputs would be one file{spelled} ({who}): give each a name of its own", path.display());
+                return Err(Error::Usage(message));
+            }
+        }
+        self.inputs.iter().try_for_each(|(role, path)| check_input(&outputs, role, path))
+    }
+
+    /// Fails if an output would replace a file of a scene, which are known once it is loaded.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming both.
+    pub fn check_scene(&self, files: &[PathBuf]) -> Result<()> {
+        let mut outputs = HashMap::new();
+        for (option, path) in &self.outputs {
+            if let Some(identity) = Identity::of_existing(path) {
+                outputs.insert(identity, (&**option, &**path));
+            }
+        }
+        files.iter().try_for_each(|path| check_input(&outputs, "a file of the scene", path))
+    }
+}
+
+fn check_input(outputs: &HashMap<Identity, (&str, &Path)>, role: &str, path: &Path) -> Result<()> {
+    match Identity::of_existing(path).and_then(|identity| outputs.get(&identity)) {
+        None => Ok(()),
+        Some((option, output)) => Err(Error::Usage(format!(
+            "{}: {option} would replace {role}{}, which is read: choose another name",
+            output.display(),
+            spelled(output, path)
+        ))),
+    }
+}
+
+/// The other spelling of a file, in parentheses, if there is one.
+fn spelled(path: &Path, other: &Path) -> String {
+    if path == other { String::new() } else { format!(" ({})", other.display()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn files_are_compared_by_what_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        fs::create_dir(at("folder")).unwrap();
+        fs::write(at("old.png"), "old").unwrap();
+        fs::hard_link(at("old.png"), at("hard.png")).unwrap();
+        std::os::unix::fs::symlink("old.png", at("soft.png")).unwrap();
+        std::os::unix::fs::symlink("new.png", at("dangling.png")).unwrap();
+        std::os::unix::fs::symlink("folder", at("other")).unwrap();
+        let twice = |a: &str, b: &str| {
+            let mut plan = FilePlan::default();
+            plan.writes("-o", at(a));
+            plan.writes("--csv", at(b));
+            plan.check().err().map(|e| (e.exit_code(), e.to_string()))
+        };
+        for (a, b) in [
+            ("a.png", "a.png"),
+            ("a.png", "./a.png"),
+            ("a.png", "folder/../a.png"),
+            ("a.png", "A.PNG"),
+            ("old.png", "hard.png"),
+            ("old.png", "soft.png"),
+            ("new.png", "dangling.png"),
+            ("folder/a.png", "other/a.png"),
+            ("none/a.png", "none/a.png"),
+        ] {
+            let (code, text) = twice(a, b).unwrap_or_else(|| panic!("{a} {b}"));
+            assert!(code == 64 && text.contains("-o and --csv") && !text.contains('\n'), "{text}");
+        }
+        for (a, b) in [("a.png", "b.png"), ("old.png", "OLD.png"), ("a.png", "folder/a.png"), ("old.png", "dangling.png")] {
+            assert_eq!(twice(a, b), None, "{a} {b}");
+        }
+        // what is no file is not replaced
+        let mut plan = FilePlan::default();
+        plan.writes("-o", "/dev/null");
+        plan.writes("-o", "/dev/null");
+        plan.reads("the scene", "/dev/null");
+        plan.check().unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn inputs_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        fs::create_dir(at("cube")).unwrap();
+        fs::write(at("cube/px.png"), "face").unwrap();
+        fs::write(at("scene.glb"), "scene").unwrap();
+        std::os::unix::fs::symlink("scene.glb", at("link.glb")).unwrap();
+        let plan = |output: &str| {
+            let mut plan = FilePlan::default();
+            plan.reads("the scene", at("scene.glb"));
+            plan.reads_images("--environment", at("cube"));
+            plan.reads("--baseline", at("none.json"));
+            plan.writes("-o", at(output));
+            plan
+        };
+        for (output, role) in [("scene.glb", "the scene"), ("link.glb", "the scene"), ("cube/px.png", "--environment")] {
+            let text = plan(output).check().unwrap_err().to_string();
+            assert!(text.contains(&format!("-o would replace {role}")), "{text}");
+        }
+        // a file that is not there cannot be replaced
+        plan("none.json").check().unwrap();
+        let after = plan("link.glb").check_scene(&[at("cube/px.png"), at("scene.glb")]).unwrap_err();
+        assert!(after.to_string().contains("link.glb: -o would replace a file of the scene"), "{after}");
+        plan("new.png").check_scene(&[at("scene.glb")]).unwrap();
+        assert!(plan("scene.glb").replaces_files() && !plan("new.png").replaces_files());
+    }
+}
