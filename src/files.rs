@@ -288,7 +288,11 @@ fn named_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     temporary_name().tempfile_in(folder_of(path)).map_err(|e| match e.kind() {
         // the folder is a file
         io::ErrorKind::NotADirectory => io::ErrorKind::NotFound.into(),
-        kind => kind.into(), // without the name of the temporary file, which says nothing to the user
+        // without the name of the temporary file, which says nothing to the user
+        kind => {
+            let cause = e.get_ref().and_then(|e| e.source()).and_then(|e| e.downcast_ref::<io::Error>());
+            cause.and_then(io::Error::raw_os_error).map_or_else(|| kind.into(), io::Error::from_raw_os_error)
+        }
     })
 }
 
@@ -402,10 +406,33 @@ pub fn portable_name(name: &str) -> String {
     relative.map_or_else(String::new, |p| p.to_string_lossy().into_owned())
 }
 
+/// Variables that name folders of the user.
+const FOLDER_VARIABLES: [&str; 3] = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"];
+
+/// The folder that a variable names; `None` for one that is not set, empty or relative. The XDG Base Directory Specification says to ignore relative paths, which would
+/// put files into whatever folder the program is started in.
+fn user_folder(variable: &str) -> Option<PathBuf> {
+    std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute())
+}
+
+/// Variables that name a folder of the user by a relative path, and are ignored for it, with that path.
+pub fn ignored_user_folders() -> Vec<(&'static str, PathBuf)> {
+    let value = |name| std::env::var_os(name).map(|value| (name, PathBuf::from(value)));
+    FOLDER_VARIABLES
+        .into_iter()
+        .filter_map(value)
+        .filter(|(_, path)| path.is_relative() && !path.as_os_str().is_empty())
+        .collect()
+}
+
 /// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
 pub fn cache_folder() -> Option<PathBuf> {
-    let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
-    base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
+    user_folder("XDG_CACHE_HOME").or_else(|| Some(user_folder("HOME")?.join(".cache"))).map(|p| p.join("skylit"))
+}
+
+/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, or `~/.config/skylit`; `None` without either variable.
+pub fn config_folder() -> Option<PathBuf> {
+    user_folder("XDG_CONFIG_HOME").or_else(|| Some(user_folder("HOME")?.join(".config"))).map(|p| p.join("skylit"))
 }
 
 #[cfg(test)]

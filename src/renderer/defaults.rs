@@ -96,19 +96,12 @@ pub fn find(scene: Option<&str>) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
     let load = |folder: PathBuf| DefaultsFile::load_if_exists(&folder.join(FILE_NAME));
-    let own = config_folder().map(|f| load(f.join("skylit"))).transpose()?.flatten();
+    let own = files::config_folder().map(load).transpose()?.flatten();
     let of_scene = beside.map(load).transpose()?.flatten();
     if let Some(file) = &of_scene {
         file.check_scene_settings()?;
     }
     Ok(own.into_iter().chain(of_scene).collect())
-}
-
-/// `$XDG_CONFIG_HOME`, or `~/.config`.
-fn config_folder() -> Option<PathBuf> {
-    let of = |variable: &str| std::env::var_os(variable).filter(|v| !v.is_empty()).map(PathBuf::from);
-    // a relative path is to be ignored, says the XDG Base Directory Specification
-    of("XDG_CONFIG_HOME").filter(|p| p.is_absolute()).or_else(|| Some(of("HOME")?.join(".config")))
 }
 
 impl DefaultsFile {
