@@ -18,6 +18,8 @@ mod compare;
 mod compare_ao;
 mod config;
 mod info;
+#[cfg(unix)]
+mod limits;
 mod manners;
 mod outputs;
 mod program;
