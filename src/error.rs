@@ -68,7 +68,7 @@ pub enum Error {
 const NO_DESCRIPTORS: &str = "too many files are open: raise the limit (`ulimit -n`), or end other programs";
 
 /// Returns true for the error of a system that opens no further file: the standard library has no kind for `EMFILE` and `ENFILE`, which have the same numbers on all Unix systems.
-fn is_out_of_descriptors(error: &std::io::Error) -> bool {
+pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
     cfg!(unix) && matches!(error.raw_os_error(), Some(23 | 24))
 }
 

@@ -10,7 +10,7 @@ use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_out_of_descriptors};
 
 /// Number of first bytes by which a file is told from what others put in its place.
 const START: u64 = 1024;
@@ -221,8 +221,11 @@ impl Temporary {
             let unnamed = i32::try_from(rustix::fs::OFlags::TMPFILE.bits()).unwrap_or_default();
             let opened = OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
             // whatever keeps it from being created, a file with a name fails for the same reason, or the file system has only those
-            if let Ok(file) = opened {
-                return Ok(Self::Unnamed(file));
+            match opened {
+                Ok(file) => return Ok(Self::Unnamed(file)),
+                // what makes the file with a name has no error that says so
+                Err(e) if is_out_of_descriptors(&e) => return Err(e),
+                Err(_) => {}
             }
         }
         named_beside(path).map(Self::Named)
@@ -288,11 +291,7 @@ fn named_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     temporary_name().tempfile_in(folder_of(path)).map_err(|e| match e.kind() {
         // the folder is a file
         io::ErrorKind::NotADirectory => io::ErrorKind::NotFound.into(),
-        // without the name of the temporary file, which says nothing to the user
-        kind => {
-            let cause = e.get_ref().and_then(|e| e.source()).and_then(|e| e.downcast_ref::<io::Error>());
-            cause.and_then(io::Error::raw_os_error).map_or_else(|| kind.into(), io::Error::from_raw_os_error)
-        }
+        kind => kind.into(), // without the name of the temporary file, which says nothing to the user
     })
 }
 

@@ -55,6 +55,9 @@ impl Instance {
     /// As [`Instance::new`].
     pub(super) fn with_extensions(validation: bool, required: &[*const c_char]) -> Result<Arc<Self>> {
         super::environment::prepare()?;
+        if let Some(error) = super::manifests::deadly() {
+            return Err(error);
+        }
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(
@@ -129,7 +132,7 @@ fn explain_loader(what: &str, result: vk::Result) -> Error {
         [R::ERROR_OUT_OF_HOST_MEMORY, R::ERROR_INITIALIZATION_FAILED, R::ERROR_INCOMPATIBLE_DRIVER].contains(&result);
     let broken = if may_be_manifest { super::manifests::broken() } else { None };
     broken.unwrap_or_else(|| match result {
-        R::ERROR_INCOMPATIBLE_DRIVER => no_driver(),
+        R::ERROR_INCOMPATIBLE_DRIVER => super::manifests::unusable().unwrap_or_else(no_driver),
         _ => super::result::explain(what, result),
     })
 }

@@ -46,13 +46,38 @@ const VARIABLES: [(&str, Kind); 7] = [
 const FOLDERS: [(&str, Kind); 3] =
     [("vulkan/icd.d", Kind::Driver), ("vulkan/implicit_layer.d", Kind::Layer), ("vulkan/explicit_layer.d", Kind::Layer)];
 
-/// The error for the first manifest that is broken: where variables name it, then in the folders of the user and the system. `None` if all are as they should be.
-pub(super) fn broken() -> Option<Error> {
-    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    first_broken(&variable)
+/// The error for the first manifest of a driver that has a list in the place of an object, which the loader does not survive. To be looked for before the loader is called.
+pub(super) fn deadly() -> Option<Error> {
+    let is_list = |value: &Value| value.as_array().is_some_and(|all| !all.is_empty());
+    first_with(&variable, &|file, kind| {
+        let value: Value = serde_json::from_slice(&files::read_regular(file).ok()?).ok()?;
+        let is_deadly = kind == Kind::Driver && (is_list(&value) || value.get("ICD").is_some_and(is_list));
+        if is_deadly { fault(file, kind) } else { None }
+    })
 }
 
-fn first_broken(variable: &dyn Fn(&str) -> Option<OsString>) -> Option<Error> {
+/// The error for drivers that variables name and of which none can be used; `None` if no variable names any.
+pub(super) fn unusable() -> Option<Error> {
+    VARIABLES.iter().filter(|(_, kind)| *kind == Kind::Driver).find_map(|(name, _)| {
+        let value = variable(name)?;
+        let files = value.to_string_lossy();
+        Some(Error::Device(format!(
+            "none of the Vulkan drivers that {name} names can be used ({files}): correct or unset the variable"
+        )))
+    })
+}
+
+fn variable(name: &str) -> Option<OsString> {
+    std::env::var_os(name).filter(|value| !value.is_empty())
+}
+
+/// The error for the first manifest that is broken: where variables name it, then in the folders of the user and the system. `None` if all are as they should be.
+pub(super) fn broken() -> Option<Error> {
+    first_with(&variable, &fault)
+}
+
+/// The error for the first manifest of which `fault` finds something. `variable` gives the variables that are set.
+fn first_with(variable: &dyn Fn(&str) -> Option<OsString>, fault: &dyn Fn(&Path, Kind) -> Option<String>) -> Option<Error> {
     let named = VARIABLES.iter().flat_map(|&(name, kind)| {
         let paths = variable(name).map_or_else(Vec::new, |value| std::env::split_paths(&value).collect());
         paths.into_iter().filter(|path| !path.as_os_str().is_empty()).map(move |path| (Some(name), kind, path))
@@ -123,7 +148,10 @@ fn fault(file: &Path, kind: Kind) -> Option<String> {
     if kind == Kind::Layer {
         return None;
     }
-    match content.get("library_path").and_then(Value::as_str) {
+    if content.get("library_path").is_some() && content.get("api_version").is_none() {
+        return Some("its `ICD` has no `api_version`".to_owned());
+    }
+    match content.get("library_path").and_then(Value::as_str).filter(|library| !library.is_empty()) {
         None => Some("its `ICD` has no `library_path`".to_owned()),
         // a name without a folder is searched where the system keeps libraries
         Some(library) if library.contains('/') => {
@@ -149,7 +177,7 @@ mod tests {
                 "XDG_DATA_DIRS" | "XDG_CONFIG_DIRS" | "XDG_CONFIG_HOME" | "XDG_DATA_HOME" => Some("/nonexistent".into()),
                 _ => (asked == name).then(|| path.clone().into_os_string()),
             };
-            first_broken(&variable).map(|e| (e.exit_code(), e.to_string()))
+            first_with(&variable, &fault).map(|e| (e.exit_code(), e.to_string()))
         };
         // the machine's own are as they should be
         assert_eq!(of("VK_DRIVER_FILES", at("good.json")), None);
@@ -158,7 +186,12 @@ mod tests {
             ("", "it is not JSON ("),
             ("[]", "it has no `ICD`"),
             ("{\"ICD\": 3}", "its `ICD` has no `library_path`"),
-            ("{\"ICD\": {\"library_path\": \"/no/such.so\"}}", "its library /no/such.so does not exist"),
+            ("{\"ICD\": [1]}", "its `ICD` has no `library_path`"),
+            ("{\"ICD\": {\"library_path\": \"a.so\"}}", "its `ICD` has no `api_version`"),
+            (
+                "{\"ICD\": {\"library_path\": \"/no/such.so\", \"api_version\": \"1.3.0\"}}",
+                "its library /no/such.so does not exist",
+            ),
         ];
         for (text, why) in broken {
             std::fs::write(at("broken.json"), text).unwrap();
@@ -178,7 +211,7 @@ mod tests {
         std::fs::create_dir_all(at("data/vulkan/icd.d")).unwrap();
         std::fs::rename(at("broken.json"), at("data/vulkan/icd.d/broken.json")).unwrap();
         let variable = |name: &str| (name == "XDG_DATA_HOME").then(|| at("data").into_os_string());
-        let error = first_broken(&variable).unwrap().to_string();
+        let error = first_with(&variable, &fault).unwrap().to_string();
         assert!(error.contains("data/vulkan/icd.d/broken.json is no manifest of a Vulkan driver"), "{error}");
     }
 }

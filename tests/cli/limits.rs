@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use crate::common::command::{count, device, fails, json, place, skylit, stderr};
 use crate::common::is_full;
 
-/// How long a run may take that has nothing to wait for.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// How long a run may take that has nothing to wait for: without descriptors for caches, or with one thread, the driver compiles for a while.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A user that nobody is: limits of processes do not bind the superuser, and count all processes of a user.
 const USER: u32 = 64_321;
@@ -62,7 +62,7 @@ fn gpu_processes_that_run_out() {
     let whole = with_processes(1000, dir.path(), &render).output().unwrap();
     assert!(whole.status.success(), "{}", stderr(&whole));
     let image = std::fs::read(dir.path().join("a.exr")).unwrap();
-    let limits: Vec<usize> = if is_full() { (1..=75).collect() } else { (1..=14).chain([20, 35, 50, 66, 75]).collect() };
+    let limits: Vec<usize> = if is_full() { (1..=75).collect() } else { vec![1, 2, 5, 8, 9, 10, 11, 12, 20, 50] };
     // as on this machine, and as on one with many processors
     for threads in [None, Some("32")] {
         let mut succeeded = 0;
@@ -100,7 +100,7 @@ fn gpu_descriptors_that_run_out() {
     let [exr, other] = ["a.exr", "b.exr"].map(|name| place(&dir, name));
     let render = ["render", "builtin:plane", "--size", "32x24", "--spp", "1", "-q", "-o"];
     assert!(skylit(&[&render[..], &[&exr]].concat()).status().unwrap().success());
-    for limit in 4..=12 {
+    for limit in [4, 5, 8] {
         for args in [&["info", "builtin:plane"][..], &["diff", &exr, &exr], &[&render[..], &[&other]].concat()] {
             let mut command = skylit(&[]);
             let program = command.get_program().to_owned();
@@ -146,7 +146,9 @@ fn variables_of_drivers() {
 fn broken_manifests_of_drivers() {
     let dir = tempfile::tempdir().unwrap();
     let file = place(&dir, "garbage.json");
-    for text in ["{\"x", "", "[1, 2]", "{\"ICD\": {\"library_path\": \"/no/such.so\", \"api_version\": \"1.3.0\"}}"] {
+    for text in
+        ["{\"x", "", "[1, 2]", "{\"ICD\": [1]}", "{\"ICD\": {\"library_path\": \"/no/such.so\", \"api_version\": \"1.3.0\"}}"]
+    {
         std::fs::write(&file, text).unwrap();
         let mut command = skylit(&["doctor"]);
         command.env("VK_DRIVER_FILES", &file).env("VK_ICD_FILENAMES", &file);
