@@ -64,6 +64,14 @@ pub enum Error {
     CheckFailed(String),
 }
 
+/// What an error says where this process, or the whole system, has as many files open as it may.
+const NO_DESCRIPTORS: &str = "too many files are open: raise the limit (`ulimit -n`), or end other programs";
+
+/// Returns true for the error of a system that opens no further file: the standard library has no kind for `EMFILE` and `ENFILE`, which have the same numbers on all Unix systems.
+pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
+    cfg!(unix) && matches!(error.raw_os_error(), Some(23 | 24))
+}
+
 impl Error {
     /// The exit code of the process for this error.
     pub fn exit_code(&self) -> u8 {
@@ -108,6 +116,7 @@ impl Error {
             std::io::ErrorKind::OutOfMemory => {
                 return Error::OutOfMemory(format!("{}: {error}; --memory-limit allows more", path.as_ref().display()));
             }
+            _ if is_out_of_descriptors(error) => NO_DESCRIPTORS.to_owned(),
             _ => format!("cannot read: {error}"),
         };
         Self::input(path, message)
@@ -125,6 +134,7 @@ impl Error {
             std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
             std::io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".to_owned(),
             std::io::ErrorKind::IsADirectory => "is a folder".to_owned(),
+            _ if is_out_of_descriptors(error) => NO_DESCRIPTORS.to_owned(),
             _ => error.to_string(),
         };
         Error::Output { path: path.as_ref().to_owned(), message }

@@ -12,7 +12,7 @@ use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_out_of_descriptors};
 use crate::memory;
 
 /// Most bytes of a text that people write: settings, manifests, scripts.
@@ -257,8 +257,11 @@ impl Temporary {
             let unnamed = i32::try_from(rustix::fs::OFlags::TMPFILE.bits()).unwrap_or_default();
             let opened = OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
             // whatever keeps it from being created, a file with a name fails for the same reason, or the file system has only those
-            if let Ok(file) = opened {
-                return Ok(Self::Unnamed(file));
+            match opened {
+                Ok(file) => return Ok(Self::Unnamed(file)),
+                // what makes the file with a name has no error that says so
+                Err(e) if is_out_of_descriptors(&e) => return Err(e),
+                Err(_) => {}
             }
         }
         named_beside(path).map(Self::Named)
@@ -438,10 +441,33 @@ pub fn portable_name(name: &str) -> String {
     relative.map_or_else(String::new, |p| p.to_string_lossy().into_owned())
 }
 
+/// Variables that name folders of the user.
+const FOLDER_VARIABLES: [&str; 3] = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"];
+
+/// The folder that a variable names; `None` for one that is not set, empty or relative. The XDG Base Directory Specification says to ignore relative paths, which would
+/// put files into whatever folder the program is started in.
+fn user_folder(variable: &str) -> Option<PathBuf> {
+    std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute())
+}
+
+/// Variables that name a folder of the user by a relative path, and are ignored for it, with that path.
+pub fn ignored_user_folders() -> Vec<(&'static str, PathBuf)> {
+    let value = |name| std::env::var_os(name).map(|value| (name, PathBuf::from(value)));
+    FOLDER_VARIABLES
+        .into_iter()
+        .filter_map(value)
+        .filter(|(_, path)| path.is_relative() && !path.as_os_str().is_empty())
+        .collect()
+}
+
 /// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
 pub fn cache_folder() -> Option<PathBuf> {
-    let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
-    base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
+    user_folder("XDG_CACHE_HOME").or_else(|| Some(user_folder("HOME")?.join(".cache"))).map(|p| p.join("skylit"))
+}
+
+/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, or `~/.config/skylit`; `None` without either variable.
+pub fn config_folder() -> Option<PathBuf> {
+    user_folder("XDG_CONFIG_HOME").or_else(|| Some(user_folder("HOME")?.join(".config"))).map(|p| p.join("skylit"))
 }
 
 #[cfg(test)]

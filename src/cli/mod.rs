@@ -34,6 +34,7 @@ use clap::error::ErrorKind;
 use clap::{FromArgMatches, Parser};
 
 use crate::error::{Error, Result};
+use crate::gpu::threads;
 use crate::memory;
 use crate::settings::parse::usage_message;
 use crate::terminal::console::{Failure, one_line};
@@ -49,7 +50,7 @@ Exit codes:
        no Open Image Denoise; `verify` could not render or judge a frame
   3    an input file is missing or broken, or the scene cannot be rendered
   4    an output file cannot be written; nothing half-written is left
-  5    out of memory
+  5    out of memory, or no room for threads
   6    the Vulkan device was lost
   64   wrong usage of the command line
   70   a bug in skylit
@@ -125,18 +126,37 @@ pub fn run() -> ExitCode {
     run_from(std::env::args_os().collect())
 }
 
-/// Starts the threads that commands share: without memory for them the first use would panic.
+/// Most threads that commands share.
+const MAX_THREADS: usize = 1024;
+
+/// Starts the threads that commands share, fewer than there are processors where the system has no room for more: without them the first use would panic.
 fn start_threads() -> Result<()> {
     crate::gpu::host_memory::check_room_to_start();
-    let outcome = rayon::ThreadPoolBuilder::new().build_global();
-    outcome.map_err(|e| Error::OutOfMemory(format!("the system has no room for more threads of this process: {e}")))
+    let requested = std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse::<usize>().ok()).filter(|n| *n > 0);
+    let wanted = requested.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).min(MAX_THREADS);
+    let all = wanted + threads::RESERVED;
+    let count = match threads::room(all) {
+        room if room == all => wanted,
+        // a driver of the CPU has two for each of ours
+        room => (room.saturating_sub(threads::RESERVED) / 3).clamp(1, wanted),
+    };
+    let outcome = rayon::ThreadPoolBuilder::new().num_threads(count).build_global();
+    outcome.map_err(|e| Error::OutOfMemory(format!("the system has no room for a thread of this process: raise the limit (`ulimit -u`, or that of the container), or end other programs ({e})")))
+}
+
+/// Says which variables are ignored that name folders of the user.
+fn note_ignored_folders() {
+    for (name, path) in crate::files::ignored_user_folders() {
+        console::note(&format!("{name} is ignored: {} is not an absolute path", path.display()));
+    }
 }
 
 fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let start = Instant::now();
     // before parsing: usage errors must be reported as JSON, too
     let arguments = with_json_file(arguments);
-    let json = arguments.iter().any(|a| a == "--json");
+    let [json, quiet] =
+        [&["--json"][..], &["--quiet", "-q"]].map(|names| arguments.iter().any(|a| names.iter().any(|n| a == n)));
     panic::install();
     // before other threads start, which inherit it
     interrupt::block_file_size_signal();
@@ -148,7 +168,12 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
         match Cli::parse_from(with_view(arguments)) {
             Ok(cli) => {
                 cli.memory_limit.into_iter().for_each(|limit| memory::set_limit(limit.as_u64()));
-                start_threads().map_err(Failure::from).and_then(|()| dispatch(cli.command, start))
+                let started = start_threads().inspect(|()| {
+                    if !quiet {
+                        note_ignored_folders()
+                    }
+                });
+                started.map_err(Failure::from).and_then(|()| dispatch(cli.command, start))
             }
             Err(e) if e.kind() == ErrorKind::DisplayVersion && is_long_version => Ok(console::print(&version::long())?),
             Err(e) => explain(&e).map_err(Failure::from),

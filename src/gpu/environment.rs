@@ -12,9 +12,26 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Once, OnceLock};
 
+use super::threads;
+use crate::error::{Error, Result};
+
 const WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
 const CACHE: &str = "MESA_SHADER_CACHE_DIR";
 const NO_CACHE: &str = "MESA_SHADER_CACHE_DISABLE";
+const WORKERS: &str = "LP_NUM_THREADS";
+const BASE: &str = "XDG_CACHE_HOME";
+
+/// Variables of Mesa's developers that are switches: with them nothing is rasterized, or the driver crashes.
+const SWITCHES: [&str; 2] = ["LP_NO_RAST", "GALLIUM_NOOP"];
+/// The variable of Mesa's developers that, switched off, has vertices processed by an interpreter, which Vulkan drivers have not.
+const INTERPRETER: &str = "DRAW_USE_LLVM";
+/// The variable of Mesa's developers that names parts of rasterization to leave out, such as `no_depth`.
+const LEFT_OUT: &str = "LP_PERF";
+/// Values of switches that are off, as Mesa reads them.
+const OFF: [&str; 7] = ["0", "n", "no", "f", "F", "false", "FALSE"];
+
+/// Widths of vectors for which lavapipe computes what it should: with others it crashes, or half of the pixels are wrong.
+const WIDTHS: [&str; 3] = ["128", "256", "512"];
 
 /// Preferred vector width in bits; 0 for the CPU's widest.
 static PREFERRED: AtomicU32 = AtomicU32::new(0);
@@ -25,25 +42,33 @@ pub fn prefer_vector_bits(bits: u32) {
     PREFERRED.store(bits, Ordering::Relaxed);
 }
 
-/// Sets the variables, once per process. To be called before the Vulkan loader is opened.
+/// Checks the variables, and sets those that are missing once per process. To be called before the Vulkan loader is opened.
 ///
 /// std locks the environment for reads and writes by Rust code, but not for `getenv` in C code on another thread. A program that has such threads must open
-/// its first device before they start, or set both variables itself; then nothing is changed here.
-pub(super) fn prepare() {
+/// its first device before they start, or set these variables itself; then nothing is changed here.
+///
+/// # Errors
+/// [`Error::Device`] for a variable that would make the driver crash or compute what is wrong, [`Error::OutOfMemory`] if there is no room for a driver's threads.
+pub(super) fn prepare() -> Result<()> {
+    check(&|name| std::env::var_os(name).filter(|value| !value.is_empty()))?;
+    let requested = || requested_workers(std::env::var_os(WORKERS));
+    let workers = threads::driver_workers(requested()).ok_or_else(no_room)?;
     static PREPARED: Once = Once::new();
     PREPARED.call_once(|| {
         // a driver that another part of the process has loaded keeps its width, and must keep its cache
         if is_loaded() {
             return;
         }
-        let (cache, folder) = (std::env::var_os(CACHE), crate::files::cache_folder());
-        let mut changes = changes(std::env::var_os(WIDTH), cache.clone(), preferred_bits(), folder.clone());
+        let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+        let (cache, folder) = (variable(CACHE), crate::files::cache_folder());
+        let mut changes = changes(variable(WIDTH), cache.clone(), preferred_bits(), folder.clone());
         if changes.is_empty() {
             // the driver's own width, and its own cache, beside ours
-            let base = cache.map(PathBuf::from).or_else(|| folder.and_then(|f| f.parent().map(Path::to_path_buf)));
-            if base.is_some_and(|base| !can_hold_default_cache(&base)) {
-                changes.push((NO_CACHE, "true".into()));
-            }
+            let is_lost = variable(BASE).is_some_and(|base| !Path::new(&base).is_absolute());
+            changes.extend(default_cache(cache, folder.as_deref().and_then(Path::parent), is_lost));
+        }
+        if workers < threads::workers(requested()) {
+            changes.push((WORKERS, workers.to_string().into()));
         }
         for (mut name, mut value) in changes {
             if name == CACHE {
@@ -61,6 +86,74 @@ pub(super) fn prepare() {
             unsafe { std::env::set_var(name, value) };
         }
     });
+    // one that was loaded before starts as many threads as it did then
+    if workers < threads::workers(requested()) { Err(no_room()) } else { Ok(()) }
+}
+
+fn no_room() -> Error {
+    Error::OutOfMemory(
+        "the system has no room for the threads of a Vulkan driver: raise the limit (`ulimit -u`, or that of the container), or end other programs"
+            .into(),
+    )
+}
+
+/// Refuses values with which a driver of the CPU crashes or computes what is wrong. `variable` has those that are set.
+fn check(variable: &dyn Fn(&str) -> Option<OsString>) -> Result<()> {
+    let refuse = |name: &str, value: &OsStr, why: &str| {
+        Err(Error::Device(format!("{name}={} {why}", value.to_string_lossy().replace(char::is_control, " "))))
+    };
+    if let Some(width) = variable(WIDTH).filter(|width| !WIDTHS.iter().any(|w| width == *w)) {
+        let widths = WIDTHS.join(", ");
+        return refuse(
+            WIDTH,
+            &width,
+            &format!("is no width that the driver computes right with: set one of {widths}, or unset it"),
+        );
+    }
+    for name in SWITCHES {
+        if let Some(value) = variable(name).filter(|value| !OFF.iter().any(|off| value == *off)) {
+            return refuse(name, &value, "makes the driver render nothing: unset it");
+        }
+    }
+    if let Some(value) = variable(INTERPRETER).filter(|value| OFF.iter().any(|off| value == *off)) {
+        return refuse(INTERPRETER, &value, "makes the driver crash: unset it");
+    }
+    match variable(LEFT_OUT).filter(|parts| parts.to_string_lossy().contains("no_depth")) {
+        Some(parts) => refuse(LEFT_OUT, &parts, "makes the driver leave out the depth test: unset it"),
+        None => Ok(()),
+    }
+}
+
+/// The number of workers that the user asks for, as Mesa reads it; `None` for one for each processor.
+fn requested_workers(text: Option<OsString>) -> Option<usize> {
+    let text = text?.into_string().ok()?;
+    let number: i64 = text.trim().parse().ok()?;
+    // Mesa takes a negative number for a large one
+    Some(usize::try_from(number).unwrap_or(usize::MAX))
+}
+
+/// What to set where the driver keeps its default width. `cache`: the folder that the user has chosen for its cache; `base`: the folder of caches; `is_lost`: the driver would take
+/// another one, relative to the current folder.
+fn default_cache(cache: Option<OsString>, base: Option<&Path>, is_lost: bool) -> Option<(&'static str, OsString)> {
+    let none = Some((NO_CACHE, "true".into()));
+    match (cache, base) {
+        (Some(cache), _) => {
+            if can_hold_default_cache(Path::new(&cache)) {
+                None
+            } else {
+                none
+            }
+        }
+        (None, Some(base)) if !can_hold_default_cache(base) => none,
+        (None, Some(base)) => is_lost.then(|| (CACHE, base.as_os_str().to_owned())),
+        (None, None) => {
+            if is_lost {
+                none
+            } else {
+                None
+            }
+        }
+    }
 }
 
 /// Whether Mesa can write its shader cache below a folder: it would print a line otherwise, for either of the two folders that its versions use.
@@ -91,7 +184,7 @@ fn changes(
     let mut name = OsString::from("mesa-");
     name.push(&chosen);
     // without a separate cache folder the driver's default width stays
-    let Some(base) = cache.as_ref().map(PathBuf::from).or(folder) else { return Vec::new() };
+    let Some(base) = cache.map(PathBuf::from).or(folder) else { return Vec::new() };
     let mut changes = Vec::new();
     // a child process of skylit inherits the variable
     if base.file_name() != Some(OsStr::new(&name)) {
@@ -165,6 +258,59 @@ mod tests {
         // a program that one of us has started changes nothing
         assert_eq!(of(Some("512"), Some("/c/mesa-512"), Some(512)), []);
         assert!(changes(None, None, Some(512), None).is_empty());
+    }
+
+    #[test]
+    fn variables_that_compute_wrong_are_refused() {
+        let with = |value: &str| check(&|name| (name == WIDTH).then(|| value.into()));
+        assert!(["128", "256", "512"].iter().all(|width| with(width).is_ok()) && check(&|_| None).is_ok());
+        for wrong in ["0", "7", "64", "1024", "-256", "256 ", "0x100", "wide", "4294967552"] {
+            let error = with(wrong).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains(&format!("{WIDTH}={wrong} is no width")), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_mesas_developers_switch_off_is_refused() {
+        let with = |name: &'static str, value: &'static str| check(&move |asked| (asked == name).then(|| value.into()));
+        for (name, value) in [
+            ("LP_NO_RAST", "1"),
+            ("LP_NO_RAST", "true"),
+            ("GALLIUM_NOOP", "1"),
+            ("LP_PERF", "texmem,no_depth"),
+            ("DRAW_USE_LLVM", "0"),
+        ] {
+            let error = with(name, value).unwrap_err();
+            assert!(
+                error.exit_code() == 2 && error.to_string().starts_with(&format!("{name}={value} makes the driver")),
+                "{error}"
+            );
+        }
+        for (name, value) in
+            [("LP_NO_RAST", "0"), ("GALLIUM_NOOP", "false"), ("LP_PERF", "no_mip_linear"), ("DRAW_USE_LLVM", "1")]
+        {
+            assert!(with(name, value).is_ok(), "{name}={value}");
+        }
+    }
+
+    #[test]
+    fn workers_are_read_as_mesa_does() {
+        let of = |text: &str| requested_workers(Some(text.into()));
+        assert_eq!(
+            [of("3"), of("0"), of("-1"), of("many"), requested_workers(None)],
+            [Some(3), Some(0), Some(usize::MAX), None, None]
+        );
+    }
+
+    #[test]
+    fn a_driver_takes_no_cache_in_the_current_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let base = dir.path();
+        assert_eq!(default_cache(None, Some(base), false), None);
+        assert_eq!(default_cache(None, Some(base), true), Some((CACHE, base.into())));
+        assert_eq!(default_cache(None, None, true), Some((NO_CACHE, "true".into())));
+        assert_eq!(default_cache(None, None, false), None);
+        assert_eq!(default_cache(Some(base.into()), None, true), None);
     }
 
     #[test]

@@ -54,7 +54,10 @@ impl Instance {
     /// # Errors
     /// As [`Instance::new`].
     pub(super) fn with_extensions(validation: bool, required: &[*const c_char]) -> Result<Arc<Self>> {
-        super::environment::prepare();
+        super::environment::prepare()?;
+        if let Some(error) = super::manifests::deadly() {
+            return Err(error);
+        }
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(
@@ -63,7 +66,7 @@ impl Instance {
         })?;
         // SAFETY: no preconditions
         let version = unsafe { entry.try_enumerate_instance_version() }
-            .context("querying the Vulkan version")?
+            .map_err(|r| explain_loader("querying the Vulkan version", r))?
             .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             return Err(Error::Device(format!(
@@ -73,7 +76,8 @@ impl Instance {
             )));
         }
         // SAFETY: no preconditions
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }.context("listing Vulkan layers")?;
+        let layers =
+            unsafe { entry.enumerate_instance_layer_properties() }.map_err(|r| explain_loader("listing Vulkan layers", r))?;
         if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::Device(
                 "--validation needs VK_LAYER_KHRONOS_validation, which is not installed: install vulkan-validationlayers"
@@ -81,7 +85,8 @@ impl Instance {
             ));
         }
         // SAFETY: no preconditions
-        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.context("listing Vulkan extensions")?;
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .map_err(|r| explain_loader("listing Vulkan extensions", r))?;
         let debug_names = validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
 
         let application = vk::ApplicationInfo::default()
@@ -104,10 +109,8 @@ impl Instance {
             info = info.push_next(m);
         }
         // SAFETY: all pointers in `info` outlive the call
-        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|r| match r {
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_driver(),
-            r => super::result::explain("creating the Vulkan instance", r),
-        })?;
+        let raw =
+            unsafe { entry.create_instance(&info, None) }.map_err(|r| explain_loader("creating the Vulkan instance", r))?;
         let messenger = match &log {
             Some(log) => {
                 let utils = ext::debug_utils::Instance::new(&entry, &raw);
@@ -120,6 +123,18 @@ impl Instance {
         };
         Ok(Arc::new(Self { raw, validation: log, messenger, debug_names, entry }))
     }
+}
+
+/// The error for a call of the loader that failed. A broken manifest of a driver or layer is reported as if memory had run out, so manifests are looked at before that is believed.
+fn explain_loader(what: &str, result: vk::Result) -> Error {
+    use vk::Result as R;
+    let may_be_manifest =
+        [R::ERROR_OUT_OF_HOST_MEMORY, R::ERROR_INITIALIZATION_FAILED, R::ERROR_INCOMPATIBLE_DRIVER].contains(&result);
+    let broken = if may_be_manifest { super::manifests::broken() } else { None };
+    broken.unwrap_or_else(|| match result {
+        R::ERROR_INCOMPATIBLE_DRIVER => super::manifests::unusable().unwrap_or_else(no_driver),
+        _ => super::result::explain(what, result),
+    })
 }
 
 pub(super) fn no_driver() -> Error {

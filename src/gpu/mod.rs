@@ -15,10 +15,12 @@ pub mod host_memory;
 mod image;
 mod info;
 mod instance;
+mod manifests;
 #[cfg_attr(not(feature = "oidn"), path = "no_oidn.rs")]
 pub mod oidn;
 mod pipeline;
 mod result;
+pub mod threads;
 #[cfg(feature = "viewer")]
 mod window;
 

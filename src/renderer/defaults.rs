@@ -98,7 +98,7 @@ pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> 
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
     let load = |folder: PathBuf| DefaultsFile::load_if_exists(&folder.join(FILE_NAME));
-    let own = config_folder().map(|f| load(f.join("skylit"))).transpose()?.flatten();
+    let own = files::config_folder().map(load).transpose()?.flatten();
     let confine = match (scene, &beside) {
         (Some(scene), Some(_)) => confine.folder_for(Path::new(scene))?,
         _ => None,
@@ -113,13 +113,6 @@ pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> 
         file.check_confined(confine.as_deref())?;
     }
     Ok(own.into_iter().chain(of_scene).collect())
-}
-
-/// `$XDG_CONFIG_HOME`, or `~/.config`.
-fn config_folder() -> Option<PathBuf> {
-    let of = |variable: &str| std::env::var_os(variable).filter(|v| !v.is_empty()).map(PathBuf::from);
-    // a relative path is to be ignored, says the XDG Base Directory Specification
-    of("XDG_CONFIG_HOME").filter(|p| p.is_absolute()).or_else(|| Some(of("HOME")?.join(".config")))
 }
 
 impl DefaultsFile {

@@ -110,10 +110,9 @@ impl Renderer {
         let request = TracerRequest {
             needs: frame_needs(&settings, &how),
             streams: frame_streams(&settings, &how),
-            rays: frames
-                * u64::from(size[0])
-                * u64::from(size[1])
-                * (1 + u64::from(how.rays_per_pixel) * if is_radiance { integrator.get().rays_per_sample() } else { 1 }),
+            rays: frames.saturating_mul(u64::from(size[0]) * u64::from(size[1])).saturating_mul(
+                1 + u64::from(how.rays_per_pixel) * if is_radiance { integrator.get().rays_per_sample() } else { 1 },
+            ),
             control: &mut *control,
             warnings: &mut warnings,
         };
@@ -201,7 +200,8 @@ impl Renderer {
 impl Frames<'_> {
     /// Number of frames, including those of the warm-up.
     pub fn count(&self) -> u32 {
-        self.warm_up + self.range.end - self.range.first
+        // no more than numbers of frames can be
+        self.warm_up.saturating_add(self.range.end - self.range.first)
     }
 
     /// Frame rate, frames per second.

@@ -37,6 +37,7 @@ pub mod still_sequence;
 pub mod survey;
 
 use std::sync::Arc;
+use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 use crate::accel::features::Blend;
@@ -120,16 +121,19 @@ impl Renderer {
         let timed = |start: Instant| start.elapsed().as_secs_f64();
         let open = Instant::now();
         let (loaded, opened, seconds) = std::thread::scope(|scope| {
-            let device = scope.spawn(|| {
+            let open_device = || {
                 let start = Instant::now();
                 (Device::open(&settings.options()), timed(start))
-            });
+            };
+            // one after the other where there can be no further thread
+            let device = std::thread::Builder::new().spawn_scoped(scope, open_device);
             let start = Instant::now();
             let loaded = load::load_with(scene, options);
             let load = timed(start);
-            let (opened, device) = match device.join() {
-                Ok(done) => done,
-                Err(panic) => std::panic::resume_unwind(panic),
+            let (opened, device) = match device.map(ScopedJoinHandle::join) {
+                Ok(Ok(done)) => done,
+                Ok(Err(panic)) => std::panic::resume_unwind(panic),
+                Err(_) => open_device(),
             };
             (loaded, opened, OpenSeconds { load, device, wall: 0.0 })
         });

@@ -13,6 +13,8 @@ const AREA: [f64; 4] = [96.0, 12.0, 704.0, 346.0];
 /// Width of a letter and height of a line of the names of points, which are larger on phones: a little too much room is no harm.
 const NAME_WIDTH: f64 = 8.6;
 const NAME_HEIGHT: f64 = 15.0;
+/// Magnitude of what axes hold at most, and its inverse, below which numbers are 0: beyond it, quotients of an axis' ends would be no numbers any more.
+const MAX_MAGNITUDE: f64 = 1e100;
 /// Different colours of series; more than these repeat.
 pub const COLORS: usize = 8;
 
@@ -78,9 +80,12 @@ struct Span {
 impl Span {
     fn new(axis: &Axis, values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
         let scale = axis.scale;
-        let fits = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
-        let range = axis.range.unwrap_or_else(|| {
-            let [lo, hi] = values.filter(fits).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+        let fits = |v: &f64| v.abs() <= MAX_MAGNITUDE && (scale == Scale::Linear || *v >= 1.0 / MAX_MAGNITUDE);
+        let is_range = |[lo, hi]: &[f64; 2]| fits(lo) && fits(hi) && hi - lo >= 1.0 / MAX_MAGNITUDE;
+        let range = axis.range.filter(is_range).unwrap_or_else(|| {
+            let rounded = |v: f64| if v.abs() < 1.0 / MAX_MAGNITUDE { 0.0 } else { v };
+            let [lo, hi] =
+                values.filter(fits).map(rounded).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
             match scale {
                 _ if lo > hi => [1.0, 10.0],
                 Scale::Logarithmic => [lo / 1.3, hi * 1.3],
@@ -341,6 +346,23 @@ mod tests {
         assert_eq!(texts(Scale::Linear, [-0.11, 0.31]), ["-0.1", "0", "0.1", "0.2", "0.3"]);
         assert_eq!(texts(Scale::Logarithmic, [0.9, 30.0]), ["1", "2", "5", "10", "20"]);
         assert_eq!(texts(Scale::Logarithmic, [1e-5, 2e6]).last().unwrap(), "1M");
+        // numbers that no axis can hold, alone and beside others
+        for extreme in [0.0, 5e-324, -1e-320, f64::MIN_POSITIVE, f64::MAX, f64::MIN, f64::INFINITY, f64::NAN] {
+            for scale in [Scale::Linear, Scale::Logarithmic] {
+                for beside in [extreme, 1.0, -1e-320, 1e300] {
+                    let axis = |range| Axis { scale, range, ..Axis::default() };
+                    let points = vec![Point::from((extreme, beside)), Point::from((beside, extreme))];
+                    let series = vec![Series { points, ..Series::default() }];
+                    let layout = layout(&Chart { x: axis(Some([extreme, beside])), y: axis(None), series, ..Chart::default() });
+                    assert!(layout.x_ticks.len() < 2000 && layout.y_ticks.len() < 2000);
+                    let drawn = serde_json::to_string(&(&layout.x_ticks, &layout.y_ticks)).unwrap() + &layout.series[0].line;
+                    assert!(
+                        !drawn.contains("null") && !drawn.contains("NaN") && !drawn.contains("inf"),
+                        "{extreme} {beside}: {drawn}"
+                    );
+                }
+            }
+        }
         // no points at all
         assert!(!layout(&Chart::default()).x_ticks.is_empty());
     }

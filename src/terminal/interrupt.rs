@@ -16,6 +16,10 @@ static INSTALL: Once = Once::new();
 /// Installs the signal handler. Without it, signals end the process as usual.
 pub fn install() {
     INSTALL.call_once(|| {
+        // the handler would be in place without the thread that hears of signals
+        if crate::gpu::threads::room(1) == 0 {
+            return;
+        }
         // a failure leaves the system's own behaviour, which is good enough
         let _ = ctrlc::set_handler(|| {
             // loading asks nobody, and leaves nothing behind

@@ -154,8 +154,12 @@ impl Tracer {
             TracerKind::Compute => {
                 let specs =
                     PrecompiledPipelines::expected(&device.info, features, options, &build.streams, flat.primitive_count());
+                let is_needed = !specs.is_empty();
                 std::thread::scope(|scope| {
-                    let prepared = (!specs.is_empty()).then(|| scope.spawn(|| PrecompiledPipelines::compile(device, specs)));
+                    let compile = || PrecompiledPipelines::compile(device, specs);
+                    // without a further thread they are compiled when they are needed
+                    let start_thread = || std::thread::Builder::new().spawn_scoped(scope, compile).ok();
+                    let prepared = if is_needed { start_thread() } else { None };
                     let trees = compute::Trees::build(flat, options.kernel, build);
                     // compiling pipelines is not counted as building
                     stats.build_seconds = start.elapsed().as_secs_f64();

@@ -1,5 +1,6 @@
 //! The results as a page: a table of all frames, and of each that differs its image, its golden image and how they differ.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::golden::shown_image;
@@ -16,13 +17,14 @@ use crate::report::{self, Cell, Page, Part, Row, Section, Status, Table};
 /// # Errors
 /// [`crate::Error::Output`].
 pub fn write(summary: &Summary, frames: &[Frame], folder: &Path, command: &str, dir: &Path) -> Result<PathBuf> {
+    let frames: BTreeMap<&str, &Frame> = frames.iter().rev().map(|f| (f.name.as_str(), f)).collect();
     let mut sections = vec![Section::default()];
     let mut table = Table::new(&["frame", "tracer", "result", "seconds", "what was found"]);
     for result in &summary.frames {
         let (word, status, text) = words(result);
         let mut name = Cell::from(result.frame.as_str());
         if let Outcome::Differs(_) = result.outcome {
-            sections.push(difference(result, frames, &text)?);
+            sections.push(difference(result, frames.get(result.frame.as_str()).copied(), &text)?);
             name = name.to_section(sections.len() - 1);
         }
         let mut verdict = Cell::from(word);
@@ -67,12 +69,11 @@ fn words(result: &FrameResult) -> (&'static str, Option<Status>, String) {
 }
 
 /// The section of a frame that differs.
-fn difference(result: &FrameResult, frames: &[Frame], text: &str) -> Result<Section> {
+fn difference(result: &FrameResult, frame: Option<&Frame>, text: &str) -> Result<Section> {
     let title = match result.tracer {
         Some(tracer) => format!("{} ({})", result.frame, tracer.name()),
         None => result.frame.clone(),
     };
-    let frame = frames.iter().find(|f| f.name == result.frame);
     let (Some(images), Some(frame)) = (&result.images, frame) else {
         return Ok(with_text(Section::new(title, Vec::new()), text, frame, result));
     };

@@ -1,6 +1,7 @@
 //! `frames.toml`: which frames there are, how they are rendered, and what may differ.
 
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,8 @@ pub const NAME: &str = "frames.toml";
 /// A manifest of one frame, in a line.
 const EXAMPLE: &str =
     r#"frame = [{ name = "hall", scene = "hall.glb", render = "ao --size 96x64 --spp 64", tolerance = "z_test" }]"#;
+/// Most frames that are rendered before the one that is compared, and with it: a manifest of others is not to run for years.
+const MAX_FRAMES: u64 = 10_000;
 /// What names of scenes that are no files begin with.
 const BUILTIN: &str = "builtin:";
 
@@ -138,14 +141,32 @@ struct Entry {
 /// A manifest's text and where it is, for messages that name a line.
 struct Source<'a> {
     path: &'a Path,
-    text: &'a str,
+    /// Where lines end.
+    line_ends: Vec<usize>,
+    /// Settings by the words that they were parsed from: most frames have the same.
+    parsed: RefCell<BTreeMap<String, RenderSettings>>,
     /// [`Manifest::confine`].
     confine: Option<&'a Path>,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    fn new(path: &'a Path, text: &str, confine: Option<&'a Path>) -> Self {
+        let line_ends = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect();
+        Self { path, line_ends, parsed: RefCell::default(), confine }
+    }
+
     fn line(&self, at: usize) -> usize {
-        1 + self.text.as_bytes().iter().take(at).filter(|b| **b == b'\n').count()
+        1 + self.line_ends.partition_point(|end| *end < at)
+    }
+
+    /// Parses options of `skylit render`.
+    fn parse(&self, words: &Spanned<String>) -> Result<RenderSettings> {
+        if let Some(settings) = self.parsed.borrow().get(words.get_ref()) {
+            return Ok(settings.clone());
+        }
+        let settings = RenderSettings::from_words(words.get_ref()).map_err(|e| self.error(words.span(), e))?;
+        self.parsed.borrow_mut().insert(words.get_ref().clone(), settings.clone());
+        Ok(settings)
     }
 
     fn error(&self, span: Range<usize>, message: impl std::fmt::Display) -> Error {
@@ -191,7 +212,7 @@ impl Manifest {
         if let Some(message) = crate::files::placeholder(text.as_bytes()).filter(|_| !text.is_empty()) {
             return Err(Error::input(&path, message));
         }
-        let source = Source { path: &path, text: &text, confine: confine.as_deref() };
+        let source = Source::new(&path, &text, confine.as_deref());
         let file: File = toml::from_str(&text).map_err(|e| match e.span() {
             Some(span) => source.error(span, e.message()),
             None => Error::input(&path, e.message()),
@@ -397,8 +418,7 @@ fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) 
         settings = load.map_err(|e| source.error(file.span(), e))?;
     }
     for words in [&defaults.render, &entry.render].into_iter().flatten() {
-        let parsed = RenderSettings::from_words(words.get_ref()).map_err(|e| source.error(words.span(), e))?;
-        settings = settings.overridden_by(&parsed);
+        settings = settings.overridden_by(&source.parse(words)?);
     }
     let span = entry.render.as_ref().map_or(entry.name.span(), Spanned::span);
     settings.check().map_err(|e| source.error(span, e))?;
@@ -436,6 +456,12 @@ fn check(frame: &Frame) -> std::result::Result<(), String> {
     }
     if settings.frames.show.is_some() {
         return wrong("--show has no effect here: a frame's ambient visibility is compared");
+    }
+    let frames = settings.frames.frames.map_or(1, |range| u64::from(range.end - range.first));
+    if frames + u64::from(settings.frames.warm_up.unwrap_or(0)) > MAX_FRAMES {
+        return Err(format!(
+            "the last of its frames is compared, and up to {MAX_FRAMES} are rendered for it: use fewer --frames or less --warm-up"
+        ));
     }
     if tolerance.z_test.is_none() {
         return Ok(());

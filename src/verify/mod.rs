@@ -13,6 +13,7 @@ pub mod selection;
 pub mod session;
 pub mod tolerance;
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use bless::Change;
@@ -145,12 +146,9 @@ impl Summary {
     pub fn verdict(&self) -> Result<()> {
         // how many frames, and their names; one that several tracers rendered is one
         let frames = |is: fn(&Outcome) -> bool| {
-            let mut names: Vec<&str> = Vec::new();
-            for frame in self.frames.iter().filter(|f| is(&f.outcome)) {
-                if !names.contains(&frame.frame.as_str()) {
-                    names.push(&frame.frame);
-                }
-            }
+            let mut seen = BTreeSet::new();
+            let named = self.frames.iter().filter(|f| is(&f.outcome)).map(|f| f.frame.as_str());
+            let names: Vec<&str> = named.filter(|name| seen.insert(*name)).collect();
             let more = names.len().saturating_sub(5);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             (names.len(), names[..names.len().min(5)].join(", ") + &more)

@@ -1,5 +1,7 @@
 //! Which frames of a manifest are looked at.
 
+use std::collections::BTreeMap;
+
 use super::manifest::{Frame, Manifest};
 use crate::error::{Error, Result};
 
@@ -44,8 +46,11 @@ impl Selection {
         if frames.is_empty() {
             return Err(Error::Usage(format!("--filter {}: no frame has such a name", self.filters.join(" --filter "))));
         }
-        let first = |scene: &str| manifest.frames.iter().position(|f| f.scene == scene);
-        frames.sort_by_key(|f| (first(&f.scene), f.line));
+        let mut first: BTreeMap<&str, usize> = BTreeMap::new();
+        for (k, frame) in manifest.frames.iter().enumerate() {
+            first.entry(&frame.scene).or_insert(k);
+        }
+        frames.sort_by_key(|f| (first.get(f.scene.as_str()), f.line));
         if let Some(shard) = self.shard {
             // neighbours cost alike: deal them out in turn
             frames = frames.into_iter().skip(shard.index - 1).step_by(shard.count).collect();

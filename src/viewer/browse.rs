@@ -27,7 +27,7 @@ impl Browsing {
         let name = dialog.text_mut().clone();
         let saves = matches!(dialog, Dialog::Save(_) | Dialog::SaveSettings(_) | Dialog::Render(..));
         let (sender, chosen) = channel();
-        std::thread::spawn(move || {
+        let show = move || {
             let mut system = rfd::FileDialog::new().set_title(title);
             for (kind, extensions) in kinds {
                 system = system.add_filter(*kind, extensions);
@@ -39,7 +39,9 @@ impl Browsing {
             }
             drop(sender);
             wake();
-        });
+        };
+        // without a further thread it is as if the dialog was closed
+        let _ = std::thread::Builder::new().name("dialog".into()).spawn(show);
         Self { dialog, chosen }
     }
 

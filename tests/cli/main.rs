@@ -20,6 +20,8 @@ mod config;
 #[cfg(unix)]
 mod confine;
 mod info;
+#[cfg(unix)]
+mod limits;
 mod manners;
 mod outputs;
 mod program;

@@ -278,3 +278,47 @@ fn extensions() {
     let text = doc.error();
     assert!(text.contains("KHR_draco_mesh_compression") && text.contains("without mesh compression"), "{text}");
 }
+
+/// An index beyond 32 bits is no index, and not what its lower bits say.
+#[test]
+fn indices_that_do_not_fit() {
+    let folder = Folder::new();
+    for (pointer, key) in [
+        ("/scene", "scene"),
+        ("/scenes/0/nodes/0", "nodes"),
+        ("/nodes/0/mesh", "mesh"),
+        ("/meshes/0/primitives/0/attributes/POSITION", "an attribute"),
+        ("/accessors/0/bufferView", "bufferView"),
+        ("/bufferViews/0/buffer", "buffer"),
+    ] {
+        let mut doc = Doc::triangle();
+        doc.json["scene"] = json!(0);
+        for index in [1u64 << 32, (1 << 32) + 1, 1 << 63] {
+            let place = doc.json.pointer_mut(pointer).unwrap_or_else(|| panic!("{pointer}"));
+            *place = json!(index);
+            let text = message(folder.load("a.gltf", serde_json::to_vec(&doc.json).unwrap()));
+            assert!(text.contains(key) && text.contains(&format!("is {index}, and no file has so many")), "{text}");
+        }
+    }
+    // numbers that are no indices may be as large as they like, and so may names and what others have left in a file
+    let mut doc = Doc::triangle();
+    doc.json["extras"] = json!({ "mesh": 1u64 << 40 });
+    doc.json["cameras"] =
+        json!([{ "type": "perspective", "perspective": { "yfov": 1, "znear": 1, "zfar": 10_000_000_000u64 } }]);
+    doc.json["nodes"][0]["name"] = json!("mesh 4294967296");
+    let loaded = folder.load("a.gltf", doc.gltf());
+    assert!(loaded.is_ok(), "{}", loaded.err().map(|e| e.to_string()).unwrap_or_default());
+    // of other formats
+    let obj = |corner: &str| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {corner}\n");
+    for corner in ["4294967297", "4294967299", "-4294967295", "18446744073709551617", "3/4294967297"] {
+        let text = message(folder.load("a.obj", obj(corner)));
+        assert!(text.contains("line 4"), "{text}");
+    }
+    folder.write("a.mtl", "newmtl a\nillum 4294967300\nKd 1 0 0\n");
+    let scene = folder.load("a.obj", "mtllib a.mtl\nusemtl a\n".to_owned() + &obj("3")).unwrap();
+    assert!(
+        scene.report.warnings.join("; ").contains("no illumination model (0 to 10): ignored"),
+        "{:?}",
+        scene.report.warnings
+    );
+}

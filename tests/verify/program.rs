@@ -30,6 +30,22 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
+/// Reading, sorting and reporting take time in proportion to the number of frames.
+#[test]
+fn a_manifest_of_ten_thousand_frames() {
+    let frame = |k: usize| {
+        let scene = if k.is_multiple_of(2) { "builtin:none".to_owned() } else { format!("missing-{k}.glb") };
+        format!("[[frame]]\nname = \"frame-{k}\"\nscene = \"{scene}\"\nrender = \"ao --spp 4\"\ntolerance = \"z_test\"\n")
+    };
+    let dir = folder(&(0..10_000).map(frame).collect::<String>());
+    let [junit, page] = ["a.xml", "page"].map(|name| dir.path().join(name));
+    let start = std::time::Instant::now();
+    let out = run(&["verify", text(dir.path()), "--junit", text(&junit), "--html", text(&page)]);
+    fails(&out, 2, &["10000 frames could not be judged: frame-0, frame-2, frame-4, frame-6, frame-8 and 9995 more"]);
+    assert!(String::from_utf8_lossy(&out.stdout).contains("frames.toml: line 49998: no scene"));
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
 #[test]
 fn manifests_that_are_wrong_name_the_line() {
     let frame = |lines: &str| format!("[[frame]]\nname = \"a\"\nscene = \"builtin:plane\"\n{lines}\n");
@@ -45,6 +61,11 @@ fn manifests_that_are_wrong_name_the_line() {
         (frame("render = \"ao --spp many\"\ntolerance = \"exact\""), "line 4: \"ao --spp many\""),
         (frame("render = \"ao --max-depth 3\"\ntolerance = \"exact\""), "line 4: --max-depth has no effect"),
         (frame("render = \"ao --time-limit 3\"\ntolerance = \"exact\""), "line 1: a: --time-limit"),
+        (
+            frame("render = \"fast --frames 0..4294967295\"\ntolerance = \"exact\""),
+            "line 1: a: the last of its frames is compared, and up to 10000",
+        ),
+        (frame("render = \"fast --warm-up 10000\"\ntolerance = \"exact\""), "use fewer --frames or less --warm-up"),
         (frame("render = \"fast\"\ntolerance = \"z_test\""), "line 1: a: --preset selects frames in real time"),
         (frame("render = \"ao\"\ngolden = \"png\"\ntolerance = \"z_test\""), "a PNG has no variances"),
         (frame("render = \"ao\"\ngolden = \"jpg\"\ntolerance = \"exact\""), "line 5: unknown variant `jpg`"),

@@ -79,7 +79,13 @@ impl Peer {
         };
         let (to_us, lines) = channel();
         // ends with the process' stdout, or when nobody listens any more
-        std::thread::spawn(move || BufReader::new(stdout).lines().map_while(|l| l.ok()).try_for_each(|l| to_us.send(l)));
+        let forward = move || BufReader::new(stdout).lines().map_while(|l| l.ok()).try_for_each(|l| to_us.send(l));
+        if let Err(e) = std::thread::Builder::new().spawn(forward) {
+            // nobody would hear what it says
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(PeerError::Failed(format!("there is no room for the thread that reads its answers ({e})")));
+        }
         let files = tempfile::tempdir().map_err(|e| Error::write(std::env::temp_dir(), &e))?;
         let mut process = Self { spec: spec.clone(), title: String::new(), child, stdin, lines, files };
         let hello = process.listen(START_PATIENCE)?;

@@ -37,6 +37,9 @@ impl SavedRecord {
         let broken = |why: String| Error::input(path, format!("is no record of `skylit bench`: {why}"));
         let mut value: Value = serde_json::from_slice(&bytes).map_err(|e| broken(e.to_string()))?;
         clean(&mut value);
+        if let Some(why) = unmeasurable(&value) {
+            return Err(broken(why));
+        }
         let kind = kind_of(&value).ok_or_else(|| broken("it does not say which benchmark it is of".into()))?;
         let record = match kind {
             BenchKind::Rays => serde_json::from_value(value).map(Self::Rays),
@@ -95,6 +98,32 @@ fn clean(value: &mut Value) {
         Value::Array(all) => all.iter_mut().for_each(clean),
         Value::Object(map) => map.values_mut().for_each(clean),
         _ => {}
+    }
+}
+
+/// Greatest magnitude of what benchmarks measure, and the inverse of the least. Square roots, quotients and squares of such numbers are numbers.
+const MAX_MAGNITUDE: f64 = 1e100;
+/// Greatest count: beyond it `f64` has not every integer, and sums of counts have no room in 64 bits.
+const MAX_COUNT: u64 = 1 << 53;
+
+/// Says which number of a record no benchmark can have measured, and why; `None` if there is none.
+fn unmeasurable(value: &Value) -> Option<String> {
+    let within = |key: String, value: &Value| unmeasurable(value).map(|why| format!("{key}{why}"));
+    let separated = |key: &str, value: &Value| match value {
+        Value::Number(_) => key.to_owned(),
+        _ => format!("{key}."),
+    };
+    match value {
+        Value::Array(all) => all.iter().enumerate().find_map(|(k, v)| within(separated(&k.to_string(), v), v)),
+        Value::Object(map) => map.iter().find_map(|(key, v)| within(separated(key, v), v)),
+        Value::Number(number) => {
+            let magnitude = number.as_f64()?.abs();
+            let count = number.as_i64().map(i64::unsigned_abs).or(number.as_u64());
+            let is_too_large = count.map_or(magnitude > MAX_MAGNITUDE, |n| n > MAX_COUNT);
+            let is_too_small = magnitude > 0.0 && magnitude < 1.0 / MAX_MAGNITUDE;
+            (is_too_large || is_too_small).then(|| format!(" is {number}, which is beyond what can be measured"))
+        }
+        _ => None,
     }
 }
 
@@ -169,5 +198,10 @@ mod tests {
             );
         }
         assert!(read("").unwrap_err().to_string().contains("is empty"));
+        for number in ["5e-324", "-1e-320", "1e308", "-1e101", "9007199254740993", "18446744073709551615", "1e999"] {
+            let error = read(&format!(r#"{{"benchmark":"ao","views":[{{"reference_rmse":{number}}}]}}"#)).unwrap_err();
+            let is_named = number == "1e999" || error.to_string().contains("views.0.reference_rmse is ");
+            assert!(error.exit_code() == 3 && is_named, "{error}");
+        }
     }
 }

@@ -89,6 +89,70 @@ fn utf8(text: &[u8]) -> Cow<'_, [u8]> {
     Cow::Borrowed(&text[..end])
 }
 
+/// Keys of indices. The crate would take the lower 32 bits of a larger number.
+const INDICES: [&str; 24] = [
+    "animation",
+    "buffer",
+    "bufferView",
+    "camera",
+    "children",
+    "index",
+    "indices",
+    "input",
+    "inverseBindMatrices",
+    "joints",
+    "light",
+    "material",
+    "mesh",
+    "node",
+    "nodes",
+    "output",
+    "sampler",
+    "scene",
+    "skeleton",
+    "skin",
+    "source",
+    "texCoord",
+    "variants",
+    "mapping",
+];
+/// Digits of the smallest number that does not fit into 32 bits.
+const LARGE: usize = 10;
+
+/// Finds an index that does not fit into 32 bits: its key and value.
+fn large_index(text: &[u8]) -> Option<String> {
+    // almost no file has such a number at all
+    if !has_large_integer(text) {
+        return None;
+    }
+    let root: Value = serde_json::from_slice(text).ok()?;
+    large_index_in(&root, "")
+}
+
+/// Returns true if there may be an integer of more than nine digits.
+fn has_large_integer(text: &[u8]) -> bool {
+    let is_number = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E' | b'+' | b'-');
+    let mut words = text.split(|&b| !is_number(b)).filter(|word| word.len() >= LARGE);
+    words.any(|word| word.iter().all(u8::is_ascii_digit))
+}
+
+/// Finds an index that does not fit into 32 bits in a value of this key.
+fn large_index_in(value: &Value, key: &str) -> Option<String> {
+    match value {
+        Value::Number(number) if INDICES.contains(&key) => {
+            let is_large = number.as_u64().is_some_and(|n| u32::try_from(n).is_err());
+            is_large.then(|| format!("`{key}` is {number}"))
+        }
+        Value::Array(all) => all.iter().find_map(|v| large_index_in(v, key)),
+        // names of attributes are of the file
+        Value::Object(map) if key == "attributes" || key == "targets" => {
+            map.iter().find_map(|(_, v)| large_index_in(v, "indices").map(|_| format!("an attribute is {v}")))
+        }
+        Value::Object(map) => map.iter().filter(|(k, _)| *k != "extras").find_map(|(k, v)| large_index_in(v, k)),
+        _ => None,
+    }
+}
+
 /// Parses the JSON and refuses other versions of glTF.
 pub(super) fn document(text: &[u8], path: &Path) -> Result<(Root, Doubles)> {
     #[derive(serde::Deserialize)]
@@ -101,6 +165,9 @@ pub(super) fn document(text: &[u8], path: &Path) -> Result<(Root, Doubles)> {
         // glTF 1.0 of some exporters has a number
         #[serde(default)]
         version: serde_json::Value,
+    }
+    if let Some(index) = large_index(text) {
+        return Err(Error::input(path, format!("is not valid glTF JSON: {index}, and no file has so many")));
     }
     let document = Root::from_slice(text).or_else(|e| lenient(text).ok_or(e));
     let document = match document.and_then(|document| Ok((document, serde_json::from_slice(text)?))) {

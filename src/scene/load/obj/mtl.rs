@@ -96,7 +96,7 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
             None => material.dissolve = Some(number(values)?),
         },
         "tr" => material.transparency = Some(number(values)?),
-        "illum" => material.illum = Some(number(values)? as u32),
+        "illum" => material.illum = Some(model(number(values)?)?),
         "pr" => material.roughness = Some(number(values)?),
         "pm" => material.metallic = Some(number(values)?),
         "map_ka" => material.map_ambient = Some(map(rest)?),
@@ -132,6 +132,14 @@ fn number(text: &str) -> Result<f32, String> {
     match float(word) {
         Some(x) if x.is_finite() => Ok(x as f32),
         _ => Err(format!("`{}` is not a number: ignored", text::shown(text))),
+    }
+}
+
+/// The number of an illumination model: MTL has those from 0 to 10.
+fn model(number: f32) -> Result<u32, String> {
+    match number.fract() == 0.0 && (0.0..=10.0).contains(&number) {
+        true => Ok(number as u32),
+        false => Err(format!("`{number}` is no illumination model (0 to 10): ignored")),
     }
 }
 

@@ -258,7 +258,7 @@ pub(super) fn float(word: &str) -> Option<f64> {
     })
 }
 
-/// The number of a smoothing group; 0 for `off`.
+/// The number of a smoothing group; 0 for `off`. Numbers are names: those that do not fit into 32 bits are told apart as far as they can be.
 fn smoothing_group(rest: &str) -> u32 {
     let word = words(rest).next().unwrap_or("off");
     match word.parse::<f64>() {
