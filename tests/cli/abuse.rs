@@ -339,10 +339,10 @@ fn gpu_disks_that_are_full() {
         ends(&out, 4, "a.exr: cannot write: the disk is full");
         assert_eq!(out.stdout, b"older\na.exr\n", "{}", String::from_utf8_lossy(&out.stdout));
     }
-    for name in ["a.png", "a.webp", "a.jpg", "a.apng"] {
+    let frames = ["render", "builtin:cornell-box", "--size", "160x120", "--preset", "fast", "--quiet"];
+    for (name, command) in [("a.png", large), ("a.webp", large), ("a.jpg", large), ("a.apng", frames)] {
         let script = format!("$S \"$@\" -o $F/{name}; code=$?; ls -A $F; exit $code");
-        let frames = ["render", "builtin:spheres:3000", "--size", "640x480", "--preset", "fast", "--quiet"];
-        let out = with_mount("size=4k", &script, &frames).unwrap();
+        let out = with_mount("size=4k", &script, &command).unwrap();
         ends(&out, 4, &format!("{name}: cannot write: the disk is full"));
         assert!(out.stdout.is_empty(), "{name}: {}", String::from_utf8_lossy(&out.stdout));
     }

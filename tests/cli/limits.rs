@@ -9,7 +9,7 @@ use crate::common::command::{count, device, fails, json, place, skylit, stderr};
 use crate::common::is_full;
 
 /// How long a run may take that has nothing to wait for: without descriptors for caches, or with one thread, the driver compiles for a while.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A user that nobody is: limits of processes do not bind the superuser, and count all processes of a user.
 const USER: u32 = 64_321;
@@ -62,7 +62,7 @@ fn gpu_processes_that_run_out() {
     let whole = with_processes(1000, dir.path(), &render).output().unwrap();
     assert!(whole.status.success(), "{}", stderr(&whole));
     let image = std::fs::read(dir.path().join("a.exr")).unwrap();
-    let limits: Vec<usize> = if is_full() { (1..=75).collect() } else { vec![1, 2, 5, 8, 9, 10, 11, 12, 20, 50] };
+    let limits: Vec<usize> = if is_full() { (1..=75).collect() } else { vec![1, 8, 10, 12, 20, 50] };
     // as on this machine, and as on one with many processors
     for threads in [None, Some("32")] {
         let mut succeeded = 0;
