@@ -177,7 +177,8 @@ fn gpu_folders_of_the_user_that_are_relative() {
     std::fs::create_dir_all(dir.path().join("here/settings/skylit")).unwrap();
     std::fs::write(dir.path().join("here/settings/skylit/skylit.toml"), "[image]\nsize = [5, 5]\n").unwrap();
     let variables = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"];
-    for (values, notes) in [(["home", "cache", "settings"], 3), (["", "", ""], 0), (["/nonexistent", "./cache", ""], 1)] {
+    let home = place(&dir, "home");
+    for (values, notes) in [(["home", "cache", "settings"], 3), (["", "", ""], 0), ([&home, "./cache", ""], 1)] {
         for quiet in [false, true] {
             let mut command = skylit(&["render", "builtin:plane", "--size", "8x8", "--spp", "1", "--json", "-o", "../a.exr"]);
             command.envs(variables.into_iter().zip(values)).current_dir(dir.path().join("here"));
