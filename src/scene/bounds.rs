@@ -44,7 +44,7 @@ pub(super) fn of_scene(scene: &Scene) -> Option<(DVec3, DVec3)> {
         let boxed = std::array::from_fn(|k| if placed.is_turned[k % 3] { f64::NEG_INFINITY } else { placed.extremes[k] });
         let known = union(known, boxed);
         match placed.is_turned.contains(&true) {
-            true => (shape.points.iter().map(|p| shape.extremes_of(p, &i.object_to_world)).fold(known, union), true),
+            true => (shape.touching().iter().map(|p| shape.extremes_of(p, &i.object_to_world)).fold(known, union), true),
             false => (known, is_turned),
         }
     };
@@ -127,8 +127,8 @@ struct Shape<'a> {
     geometry: &'a Geometry,
     lo: DVec3,
     hi: DVec3,
-    /// For each direction a vertex that its box touches there, or a sphere with its radius.
-    points: [Vec4; 6],
+    /// [`Shape::touching`], once an instance is turned.
+    touching: OnceLock<[Vec4; 6]>,
     looked_at: AtomicUsize,
     hierarchy: OnceLock<Hierarchy>,
 }
@@ -137,26 +137,50 @@ impl<'a> Shape<'a> {
     /// `None` for a mesh without primitives.
     fn new(geometry: &'a Geometry) -> Option<Self> {
         let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let mut points = [Vec4::ZERO; 6];
-        let mut add = |p: Vec3, radius: f32| {
-            for axis in 0..3 {
-                if p[axis] + radius > hi[axis] {
-                    hi[axis] = p[axis] + radius;
-                    points[axis] = p.extend(radius);
-                }
-                if p[axis] - radius < lo[axis] {
-                    lo[axis] = p[axis] - radius;
-                    points[axis + 3] = p.extend(radius);
-                }
-            }
-        };
         match geometry {
-            Geometry::Triangles(t) => t.indices.iter().flatten().for_each(|&i| add(t.positions[i as usize], 0.0)),
-            Geometry::Spheres(s) => s.iter().for_each(|s| add(s.center, s.radius)),
+            Geometry::Triangles(t) => t.indices.iter().flatten().for_each(|&i| {
+                let p = t.positions[i as usize];
+                (lo, hi) = (lo.min(p), hi.max(p));
+            }),
+            Geometry::Spheres(s) => {
+                s.iter().for_each(|s| (lo, hi) = (lo.min(s.center - s.radius), hi.max(s.center + s.radius)))
+            }
         }
         let (lo, hi) = (lo.as_dvec3(), hi.as_dvec3());
         let is_empty = geometry.primitive_count() == 0;
-        (!is_empty).then(|| Self { geometry, lo, hi, points, looked_at: AtomicUsize::new(0), hierarchy: OnceLock::new() })
+        (!is_empty).then(|| Self {
+            geometry,
+            lo,
+            hi,
+            touching: OnceLock::new(),
+            looked_at: AtomicUsize::new(0),
+            hierarchy: OnceLock::new(),
+        })
+    }
+
+    /// For each direction a vertex that the mesh's box touches there, or a sphere with its radius.
+    fn touching(&self) -> &[Vec4; 6] {
+        self.touching.get_or_init(|| {
+            let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let mut points = [Vec4::ZERO; 6];
+            let mut add = |p: Vec3, radius: f32| {
+                for axis in 0..3 {
+                    if p[axis] + radius > hi[axis] {
+                        hi[axis] = p[axis] + radius;
+                        points[axis] = p.extend(radius);
+                    }
+                    if p[axis] - radius < lo[axis] {
+                        lo[axis] = p[axis] - radius;
+                        points[axis + 3] = p.extend(radius);
+                    }
+                }
+            };
+            match self.geometry {
+                Geometry::Triangles(t) => t.indices.iter().flatten().for_each(|&i| add(t.positions[i as usize], 0.0)),
+                Geometry::Spheres(s) => s.iter().for_each(|s| add(s.center, s.radius)),
+            }
+            points
+        })
     }
 
     fn extremes_of(&self, point: &Vec4, to_world: &DAffine3) -> Extremes {
