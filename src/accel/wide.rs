@@ -113,11 +113,11 @@ impl WideBvh {
 
     /// Checks that every block is reached once and every child exists, that leaves lie within the boxes above them, and that the depth is as recorded and at most
     /// [`MAX_DEPTH`]. Nothing in the tree is trusted; the time is linear in its size. `bounds_of` returns the bounds of a leaf's primitives, or the empty box where
-    /// they may stick out (a leaf that holds a part of them).
+    /// they may stick out (a leaf that holds a part of them). Returns the bounds of all leaves together.
     ///
     /// # Errors
     /// A description of the first defect.
-    pub fn validate(&self, bounds_of: impl Fn(&Block) -> Aabb) -> Result<(), String> {
+    pub fn validate(&self, bounds_of: impl Fn(&Block) -> Aabb + Sync) -> Result<Aabb, String> {
         // parents before children: each block's parent, and its slot there
         let mut seen = vec![false; self.blocks.len()];
         let mut order = Vec::new();
@@ -145,12 +145,9 @@ impl WideBvh {
         }
 
         // children before parents: what is below a block lies within the box that its parent has for it
-        let mut below = vec![Aabb::EMPTY; self.blocks.len()];
+        let of_leaf = |b: &Block| if is_leaf(b) { bounds_of(b) } else { Aabb::EMPTY };
+        let mut below: Vec<Aabb> = self.blocks.par_iter().map(of_leaf).collect();
         for &(at, parent, slot) in order.iter().rev() {
-            let block = &self.blocks[at as usize];
-            if is_leaf(block) {
-                below[at as usize] = bounds_of(block);
-            }
             if at == 0 {
                 continue;
             }
@@ -162,7 +159,7 @@ impl WideBvh {
             }
             below[parent as usize] = below[parent as usize].union(own);
         }
-        Ok(())
+        Ok(below[0])
     }
 }
 
@@ -438,7 +435,7 @@ pub(super) mod tests {
         if items != (0..boxes.len() as u32).collect::<Vec<_>>() {
             return Err("not every item has one leaf".into());
         }
-        tree.validate(|b| boxes[b.body[0] as usize])
+        tree.validate(|b| boxes[b.body[0] as usize]).map(drop)
     }
 
     #[test]

@@ -84,21 +84,22 @@ impl OutputArgs {
         plan
     }
 
-    /// Checks that every output file can be written and replaces none of the records that are read, before anything that takes long.
+    /// Checks that every output file can be written and replaces none of the records that are read, before anything that takes long. The plan has made the folder of the report.
     ///
     /// # Errors
     /// [`Error::Usage`] for a format of plots that there is not; those of [`FilePlan::check`] and [`files::check_writable`].
-    pub fn check(&self, records: &[PathBuf], baselines: &[PathBuf]) -> Result<()> {
+    pub fn check(&self, records: &[PathBuf], baselines: &[PathBuf]) -> Result<FilePlan> {
         let mut plan = self.plan();
         records.iter().for_each(|path| plan.reads("a record", path));
         baselines.iter().for_each(|path| plan.reads("--baseline", path));
         plan.check()?;
-        self.check_writable()
+        self.check_writable(&mut plan)?;
+        Ok(plan)
     }
 
-    fn check_writable(&self) -> Result<()> {
+    fn check_writable(&self, plan: &mut FilePlan) -> Result<()> {
         self.plot.as_ref().map_or(Ok(()), |path| PlotFormat::of(path).map(drop))?;
-        self.html.as_ref().map_or(Ok(()), |dir| std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, &e)))?;
+        self.html.as_ref().map_or(Ok(()), |dir| plan.make_folder(dir))?;
         self.json_file().into_iter().chain(&self.plot).try_for_each(|path| files::check_writable(path))
     }
 
@@ -148,14 +149,16 @@ impl CommonArgs {
         self.outputs.console()
     }
 
-    /// Checks the arguments before anything that takes long.
+    /// Checks the arguments before anything that takes long. The plan has made the folder of the report.
     ///
     /// # Errors
     /// Those of [`OutputArgs::check`], for the CSV table too.
-    pub fn check(&self) -> Result<()> {
-        self.plan().check()?;
-        self.outputs.check_writable()?;
-        self.csv.as_deref().map_or(Ok(()), files::check_writable)
+    pub fn check(&self) -> Result<FilePlan> {
+        let mut plan = self.plan();
+        plan.check()?;
+        self.outputs.check_writable(&mut plan)?;
+        self.csv.as_deref().map_or(Ok(()), files::check_writable)?;
+        Ok(plan)
     }
 
     /// Checks that no output replaces a scene, a file that one refers to, the environment, or the list of peers.

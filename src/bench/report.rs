@@ -66,7 +66,7 @@ struct ReportedJson<'a> {
 /// worse than a baseline's.
 pub fn run(args: &BenchReportArgs) -> Result<(), Failure> {
     let console = args.outputs.console();
-    args.outputs.check(&args.records, &args.baseline)?;
+    let _plan = args.outputs.check(&args.records, &args.baseline)?;
     let mut reported = Vec::new();
     for file in &args.records {
         reported.push(ReportedRecord { file: file.clone(), record: SavedRecord::read(file)?, baseline: None });

@@ -11,6 +11,7 @@ use super::record::BenchRecord;
 use super::report::{ReportedRecord, show_address};
 use super::table::{self, Block};
 use crate::error::{Error, Result};
+use crate::files::plan::FilePlan;
 use crate::scene::Scene;
 use crate::terminal::console::{Console, Failure, one_line};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -40,6 +41,8 @@ pub struct Session<'a, A, R> {
     jobs: (u64, u64),
     /// The first error.
     failure: Option<Error>,
+    /// Keeps the folder of the report, which is removed with it while it is empty.
+    _plan: FilePlan,
 }
 
 impl<'a, A, R: BenchRecord> Session<'a, A, R> {
@@ -49,7 +52,7 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
     /// Those of [`CommonArgs::check`], of [`Baseline::read`] and [`Baseline::check`], and of [`BenchDevice::open`].
     pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> R) -> Result<Self> {
         let start = Instant::now();
-        common.check()?;
+        let plan = common.check()?;
         let baseline = common.baseline.as_deref().map(Baseline::read).transpose()?;
         interrupt::install();
         let console = common.console();
@@ -69,6 +72,7 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
             start,
             jobs: (0, 1),
             failure: None,
+            _plan: plan,
         })
     }
 

@@ -207,14 +207,12 @@ impl CompareArgs {
             settings.iter_mut().for_each(render::add_ids);
         }
         self.add_first_frames(sources, &mut settings);
-        let plan = self.plan(sources, &settings)?;
+        let mut plan = self.plan(sources, &settings)?;
         plan.check()?;
         for path in self.difference.iter().chain(&self.flip) {
             picture::paths(sources.len(), self.reference, path)?.iter().try_for_each(|p| files::check_writable(p))?;
         }
-        for folder in self.html.iter().chain(&self.save) {
-            std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
-        }
+        self.html.iter().chain(&self.save).try_for_each(|folder| plan.make_folder(folder))?;
         self.csv.iter().try_for_each(|path| files::check_writable(path))?;
         Ok((settings, plan))
     }

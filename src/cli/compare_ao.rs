@@ -145,9 +145,7 @@ impl AoVsPathArgs {
             }
             crate::files::check_writable(path)?;
         }
-        if let Some(folder) = &self.html {
-            std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
-        }
+        self.html.iter().try_for_each(|folder| plan.make_folder(folder))?;
         #[cfg(feature = "bench")]
         if let Some(path) = &self.plot {
             plot::check(path)?;

@@ -93,12 +93,12 @@ impl StressArgs {
 /// Runs the suite and reports.
 pub fn run(args: &StressArgs) -> Result<(), Failure> {
     let options = args.options()?;
+    let mut plan = FilePlan::default();
     if let Some(folder) = args.html() {
-        let mut plan = FilePlan::default();
         args.scene.iter().for_each(|scene| plan.reads("the scene", scene));
         plan.writes_report("--html", folder);
         plan.check()?;
-        std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
+        plan.make_folder(folder)?;
     }
     interrupt::install();
     let console = args.verbosity.console();

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
+use super::args::LoadArgs;
 use super::config::{self, ConfigArgs};
 use crate::error::{Error, Result};
 use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::RenderSettings;
 use crate::renderer::defaults;
 use crate::renderer::settings::ImageSettings;
-use crate::scene::load::{self, Confine};
+use crate::scene::load;
 use crate::settings::parse::parse_rate;
 use crate::terminal::console::{Failure, Verbosity};
 use crate::tracer::DeviceSettings;
@@ -35,6 +36,9 @@ pub struct ViewArgs {
     /// Read settings from this file, .json or .toml, which the viewer or a person has written; options given here replace what it says
     #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
+    /// Which files the scene may name.
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Files of defaults.
     #[command(flatten)]
     pub config: ConfigArgs,
@@ -105,7 +109,8 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let given = args.settings.over_file(args.settings_file.as_deref())?;
     given.camera.check()?;
     check_has_effect(&given)?;
-    let files = args.config.files(args.scene.as_deref(), Confine::Nowhere)?;
+    let confine = args.load.options().confine;
+    let files = args.config.files(args.scene.as_deref(), confine)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
     device_settings.check()?;
@@ -119,6 +124,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
     let options = ViewOptions {
         scene: args.scene.clone(),
+        confine,
         size: settings.image.size.unwrap_or(DEFAULT_SIZE),
         settings,
         device: device_settings,

@@ -5,6 +5,7 @@
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::{folder_of, link_target};
 use crate::error::{Error, Result};
@@ -26,6 +27,27 @@ use crate::error::{Error, Result};
 pub struct FilePlan {
     outputs: Vec<(String, PathBuf)>,
     inputs: Vec<(String, PathBuf)>,
+    folders: Vec<Arc<NewFolder>>,
+}
+
+/// The folders of a path that were made for results, innermost first. Those that are still empty when it is dropped are removed.
+#[derive(Debug)]
+struct NewFolder(Vec<PathBuf>);
+
+impl NewFolder {
+    fn create(folder: &Path) -> Result<Self> {
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && fs::symlink_metadata(path).is_err();
+        let made = Self(folder.ancestors().take_while(is_missing).map(Path::to_owned).collect());
+        fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
+        Ok(made)
+    }
+}
+
+impl Drop for NewFolder {
+    fn drop(&mut self) {
+        // a folder that is not empty stays, and all around it
+        let _ = self.0.iter().try_for_each(fs::remove_dir);
+    }
 }
 
 /// What a file is, however it is spelled.
@@ -90,6 +112,15 @@ impl FilePlan {
     /// Adds the page of a report that will be written into a folder.
     pub fn writes_report(&mut self, option: &str, folder: impl AsRef<Path>) {
         self.writes(option, folder.as_ref().join("index.html"));
+    }
+
+    /// Makes a folder that results will be written into, where it is missing. It is taken away again with the plan's last copy, if nothing was written.
+    ///
+    /// # Errors
+    /// [`Error::Output`] when it cannot be made.
+    pub fn make_folder(&mut self, folder: &Path) -> Result<()> {
+        self.folders.push(Arc::new(NewFolder::create(folder)?));
+        Ok(())
     }
 
     /// Whether a file that will be written exists already. None that does not can replace an input.

@@ -254,11 +254,13 @@ fn check_loaded(tree: &WideBvh, source: &impl LeafSource, preset: BuildPreset) -
     let bounds = |b: &Block| {
         numbers(b).into_iter().filter(|n| *n != pairs::NONE).map(|n| source.bounds(n)).fold(Aabb::EMPTY, Aabb::union)
     };
-    match preset {
-        BuildPreset::Best => tree.validate(|_| Aabb::EMPTY)?,
+    let all = match preset {
+        BuildPreset::Best => {
+            tree.validate(|_| Aabb::EMPTY)?;
+            leaves().map(bounds).fold(Aabb::EMPTY, Aabb::union)
+        }
         _ => tree.validate(bounds)?,
-    }
-    let all = leaves().map(bounds).fold(Aabb::EMPTY, Aabb::union);
+    };
     let is_within = tree.bounds.is_some_and(|b| b.contains(&all) && b.min.is_finite() && b.max.is_finite());
     if is_within && tree.sah_cost >= 0.0 && tree.sah_cost.is_finite() {
         Ok(())

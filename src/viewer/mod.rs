@@ -18,6 +18,7 @@ pub mod window;
 pub mod worker;
 
 use crate::renderer::RenderSettings;
+use crate::scene::load::Confine;
 use crate::tracer::DeviceSettings;
 
 /// Frame rate that is held on CPU drivers, frames per second.
@@ -40,6 +41,8 @@ crate::settings::choices! {
 pub struct ViewOptions {
     /// The scene, a file or `builtin:NAME`; none: the viewer asks for one.
     pub scene: Option<String>,
+    /// Where the files lie that a scene may refer to, of scenes that are opened later, too.
+    pub confine: Confine<'static>,
     /// Settings of images.
     pub settings: RenderSettings,
     /// Device and tracer.

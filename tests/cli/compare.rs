@@ -228,3 +228,31 @@ fn gpu_presets_have_a_first_frame() {
     let record = of(&["--a", "fast --warm-up 0", "--b", "ao --spp 4", "--c", "fast --warm-up 0 --at-rest hold"]);
     assert!(record["warnings"].to_string().contains("A and C are the same in every bit"), "{record}");
 }
+
+/// A folder for results that is made before anything is read is not there afterwards, if nothing was written into it.
+#[test]
+fn gpu_folders_of_results_that_did_not_come() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let folder = place(&dir, "new/of/report");
+    let table = place(&dir, "new/of/report/table.csv");
+    let missing = place(&dir, "none.gltf");
+    for args in [
+        &["compare", &missing, &missing, "--html", &folder, "--csv", &table][..],
+        &["compare", "--scene", &missing, "--a", "ao", "--b", "ao-sky", "--save", &folder],
+        &["compare", "ao-vs-path", &missing, "--html", &folder],
+        &["bench", "report", &missing, "--html", &folder],
+        &["bench", "rays", &missing, "--html", &folder],
+    ] {
+        let out = run(args);
+        assert!(!out.status.success(), "{args:?}");
+        assert!(stderr(&out).contains("none.gltf"), "{args:?}: {}", stderr(&out));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "{args:?}");
+    }
+    // a folder that was there stays
+    std::fs::create_dir_all(&folder).unwrap();
+    assert!(!run(&["compare", &missing, &missing, "--html", &folder]).status.success());
+    assert!(Path::new(&folder).is_dir());
+}

@@ -225,6 +225,10 @@ fn gpu_commands_that_read_scenes() {
         fails(&place.run(&args), 3, &["scene/s.gltf: refers to ../secret.png", "--confine"]);
     }
     assert!(!Path::new(&place.top.path().join("a.glb")).exists());
+    // a window stays open, and a script of the viewer fails
+    fs::write(place.top.path().join("script.txt"), "wait settled\n").unwrap();
+    let out = place.run(&["view", "scene/s.gltf", "--headless-script", "script.txt", "--confine"]);
+    fails(&out, 1, &["script.txt, line 1", "scene/s.gltf: refers to ../secret.png", "--confine"]);
     // a built-in scene has no files
     let out = place.run(&["render", "builtin:plane", "-o", "b.png", "--size", "8x8", "--spp", "1", "--confine"]);
     assert!(out.status.success(), "{}", stderr(&out));

@@ -30,6 +30,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
     let (sender, events) = std::sync::mpsc::channel();
     let options = ViewOptions {
         scene: scene.map(str::to_owned),
+        confine: Default::default(),
         settings,
         device: Default::default(),
         size: [1000, 700],

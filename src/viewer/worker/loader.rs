@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::load::{self, ImagesDecoded, LoadOptions};
+use crate::scene::load::{self, Confine, ImagesDecoded, LoadOptions};
 use crate::viewer::request::{Event, EventSender, Mailbox};
 
 /// What has been loaded.
@@ -31,15 +31,16 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Starts to load a file or `builtin:NAME`. Progress is sent as events; `mailbox` is woken for every part.
+    /// Starts to load a file or `builtin:NAME`; `confine`: where the files lie that it may refer to. Progress is sent as events; `mailbox` is woken for every part.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] when there can be no further thread.
-    pub fn start(source: &str, mailbox: &Arc<Mailbox>, events: &EventSender) -> Result<Self> {
+    pub fn start(source: &str, confine: Confine<'static>, mailbox: &Arc<Mailbox>, events: &EventSender) -> Result<Self> {
         let (sender, parts) = sync_channel(2);
         let [is_ready, is_cancelled] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let job = Job {
             source: source.to_owned(),
+            confine,
             parts: sender,
             wake: Wake { mailbox: mailbox.clone(), is_ready: is_ready.clone() },
             is_cancelled: is_cancelled.clone(),
@@ -93,6 +94,7 @@ impl Drop for Loader {
 
 struct Job {
     source: String,
+    confine: Confine<'static>,
     parts: SyncSender<Result<Loaded>>,
     is_cancelled: Arc<AtomicBool>,
     events: EventSender,
@@ -122,7 +124,7 @@ impl Job {
                 self.events.send(Event::Loading(format!("loading {name}: {}{of} images", images.done), share));
             }
         };
-        load::load_with(&self.source, &LoadOptions { textures, progress: &progress, ..Default::default() })
+        load::load_with(&self.source, &LoadOptions { textures, progress: &progress, confine: self.confine })
     }
 
     fn send(&self, part: Result<Loaded>) {

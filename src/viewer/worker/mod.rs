@@ -22,6 +22,7 @@ use crate::output::{self, ImageFormat};
 use crate::renderer::interactive::View;
 use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
+use crate::scene::load::Confine;
 use crate::scene::{Camera, Scene};
 use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
@@ -38,16 +39,17 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// A comparison may take this share of the time.
 const COMPARISON_SHARE: u32 = 5;
 
-/// Starts the thread.
+/// Starts the thread. `confine`: where the files lie that scenes may refer to.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] when there can be no further thread.
-pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()>> {
+pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender, confine: Confine<'static>) -> Result<JoinHandle<()>> {
     let run = move || {
         let reporter = events.clone();
         let worker = Worker {
             mailbox,
             events,
+            confine,
             open: None,
             device_losses: 0,
             listed_devices: false,
@@ -67,6 +69,7 @@ pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()
 struct Worker {
     mailbox: Arc<Mailbox>,
     events: EventSender,
+    confine: Confine<'static>,
     open: Option<OpenScene>,
     device_losses: u32,
     listed_devices: bool,
@@ -163,7 +166,7 @@ impl Worker {
         request: &Request,
         device: Option<Arc<Device>>,
     ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
-        let mut loader = Loader::start(source, &self.mailbox, &self.events)?;
+        let mut loader = Loader::start(source, self.confine, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),
             None => Device::open(&request.device.options()),
