@@ -4,6 +4,8 @@
 //! Unless the user says how much may be taken (`--memory-limit`), it is at most half of the machine's memory, and at most [`FREE`] more than [`PER_BYTE`] times the
 //! bytes that were read: images of one colour, which compress best of all that people use, stay far below.
 
+#[cfg(target_os = "linux")]
+use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use bytesize::ByteSize;
@@ -136,14 +138,28 @@ fn physical() -> Option<u64> {
     Some(u64::from(system.totalram).saturating_mul(u64::from(system.mem_unit.max(1))))
 }
 
-/// The smallest limit of the process's control group and those above it (cgroups version 2).
 #[cfg(target_os = "linux")]
 fn control_group() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/cgroup").ok()?;
-    let name = text.lines().find_map(|line| line.strip_prefix("0::/"))?;
-    let group = std::path::Path::new("/sys/fs/cgroup").join(name);
-    let limit = |folder: &std::path::Path| std::fs::read_to_string(folder.join("memory.max")).ok()?.trim().parse().ok();
-    group.ancestors().take_while(|folder| folder.starts_with("/sys/fs/cgroup")).filter_map(limit).min()
+    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
+    group_limit(&groups, |file| std::fs::read_to_string(file).ok()?.trim().parse().ok())
+}
+
+/// The smallest limit of a process's control groups and those above them, bytes. `groups`: what /proc/self/cgroup says, of either version (cgroups(7)); `limit` reads a file.
+#[cfg(target_os = "linux")]
+fn group_limit(groups: &str, limit: impl Fn(&Path) -> Option<u64>) -> Option<u64> {
+    let smallest = |line: &str| {
+        // number of the hierarchy, its controllers (none in version 2), the group
+        let mut parts = line.splitn(3, ':').skip(1);
+        let (controllers, group) = (parts.next()?, parts.next()?);
+        let (mount, file) = match controllers {
+            "" => ("/sys/fs/cgroup", "memory.max"),
+            some if some.split(',').any(|c| c == "memory") => ("/sys/fs/cgroup/memory", "memory.limit_in_bytes"),
+            _ => return None,
+        };
+        let group = Path::new(mount).join(group.trim_start_matches('/'));
+        group.ancestors().take_while(|folder| folder.starts_with(mount)).filter_map(|folder| limit(&folder.join(file))).min()
+    };
+    groups.lines().filter_map(smallest).min()
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -169,6 +185,26 @@ fn address_space() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Control groups of both versions, and a container whose own group is the root of what it sees.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn limits_of_control_groups() {
+        let limit = |groups: &str, files: &[(&str, u64)]| {
+            group_limit(groups, |file| files.iter().find(|(name, _)| Path::new(name) == file).map(|(_, bytes)| *bytes))
+        };
+        let second = "0::/user/job\n";
+        let in_job = ("/sys/fs/cgroup/user/job/memory.max", 300);
+        assert_eq!(limit(second, &[in_job]), Some(300));
+        assert_eq!(limit(second, &[in_job, ("/sys/fs/cgroup/user/memory.max", 200)]), Some(200));
+        assert_eq!(limit(second, &[("/sys/fs/cgroup/memory.max", 100)]), Some(100));
+        let first = "5:devices:/a\n4:cpu,memory:/docker/3f\n0::/\n";
+        let whole = ("/sys/fs/cgroup/memory/memory.limit_in_bytes", 900);
+        assert_eq!(limit(first, &[whole]), Some(900));
+        assert_eq!(limit(first, &[whole, ("/sys/fs/cgroup/memory/docker/3f/memory.limit_in_bytes", 400)]), Some(400));
+        assert_eq!(limit(first, &[("/sys/fs/cgroup/devices/a/memory.limit_in_bytes", 1)]), None);
+        assert_eq!(limit("nonsense\n", &[whole]), None);
+    }
 
     #[test]
     fn memory_follows_what_was_read() {

@@ -57,6 +57,46 @@ fn frames(tracer: &Tracer, flat: &FlatScene, preset: Preset, seed: u32) -> Realt
     Realtime::radiance(tracer, flat, SIZE, &settings, &options).unwrap()
 }
 
+/// The shadow of a pole is two pixels wide, and moves by as much from frame to frame: where it has come it is nearly as dark as in a still.
+#[test]
+fn gpu_frames_thin_shadows_move() {
+    const LAST: u32 = 15;
+    let device = device();
+    // sun and pole of a defect: a fifth of the contrast was kept
+    let at = |frame: u32| {
+        let turn = DMat3::from_rotation_y(-1.0 + f64::from(frame) / 12.0);
+        let angle = f64::to_radians(50.0);
+        let mut scene = poles(0.12, &[0.0], turn * DVec3::new(0.0, -angle.sin(), -angle.cos()));
+        scene.cameras[0] = Camera::look_at(DVec3::new(0.0, 2.2, 6.0), DVec3::new(-0.2, 0.0, -0.8), DVec3::Y, 0.41);
+        scene
+    };
+    let (scene, last, before) = (at(0), at(LAST), at(LAST - 2));
+    let [flat, last, before] = [&scene, &last, &before].map(FlatScene::for_paths);
+    let [now, past] = [&last, &before].map(|flat| still(&tracer(&device, TracerKind::Compute, flat), flat));
+    let darkened: Vec<usize> = (0..now.len()).filter(|&k| now[k] > 0.0 && now[k] < 0.5 * past[k]).collect();
+    assert!(darkened.len() >= 8, "{} pixels", darkened.len());
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    for (preset, least) in [(Preset::Fast, 0.5), (Preset::Balanced, 0.65), (Preset::Quality, 0.65)] {
+        let kept = (1..=3).map(|seed| {
+            let mut frames = frames(&tracer, &flat, preset, seed);
+            for frame in 0..=LAST {
+                let posed = at(frame);
+                if frame > 0 {
+                    frames.move_lights(&tracer, &posed).unwrap();
+                }
+                frames.frame(&tracer, &record(&posed), &[]).unwrap();
+            }
+            let image = red(&frames.result().unwrap());
+            let sum = |a: &[f32], b: &[f32]| darkened.iter().map(|&k| f64::from(a[k] - b[k])).sum::<f64>();
+            sum(&past, &image) / sum(&past, &now)
+        });
+        let kept = kept.sum::<f64>() / 3.0;
+        println!("{preset}: {kept:.2} of the contrast of a shadow in {} pixels", darkened.len());
+        assert!((least..1.3).contains(&kept), "{preset}: {kept}");
+    }
+    assert_validation_clean(&device);
+}
+
 /// A pole that moves before the edge between floor and wall, whose values are far apart: no clip to values nearby tells that it was there.
 #[test]
 fn gpu_frames_what_is_uncovered_at_an_edge_has_no_ghost() {
