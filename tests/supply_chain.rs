@@ -40,6 +40,26 @@ fn locked(name: &str) -> Vec<Table> {
     read(name)["package"].as_array().unwrap().iter().map(|p| p.as_table().unwrap().clone()).collect()
 }
 
+/// `scripts/fuzz.sh` builds with `--locked`: its lock file has every package that the program needs whatever its features.
+#[test]
+fn fuzz_targets_are_locked() {
+    let manifest = read("Cargo.toml");
+    let needed = |table: &Table| -> Vec<String> {
+        let kinds = ["dependencies", "build-dependencies"].iter().filter_map(|kind| table.get(*kind)?.as_table().cloned());
+        let is_optional = |value: &Value| value.get("optional").and_then(Value::as_bool) == Some(true);
+        kinds.flatten().filter(|(_, value)| !is_optional(value)).map(|(name, _)| name).collect()
+    };
+    let of_targets = manifest["target"].as_table().unwrap().values().flat_map(|table| needed(table.as_table().unwrap()));
+    let packages = locked("fuzz/Cargo.lock");
+    let own = packages.iter().find(|package| text(package, "name") == "skylit").unwrap();
+    // a name, with the version where there are several
+    let listed: Vec<String> =
+        texts(&own["dependencies"]).iter().map(|entry| entry.split(' ').next().unwrap().to_owned()).collect();
+    for name in needed(&manifest).into_iter().chain(of_targets) {
+        assert!(listed.contains(&name), "{name}: run `cargo update --workspace --manifest-path fuzz/Cargo.toml`");
+    }
+}
+
 /// Packages come from the registry, with a checksum, or lie in this repository.
 #[test]
 fn sources() {
