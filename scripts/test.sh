@@ -5,9 +5,9 @@
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
-# the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one), lints of the program without benchmarks and viewer.
+# the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one), lints of the library alone and of the program without benchmarks and viewer.
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
-# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays, degenerate scenes a quarter and brute force a third of that, and frames at rest are followed in two of four scenes. The floor driver leaves
+# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays, degenerate scenes a quarter and brute force a third of that, and frames at rest are followed in one of four scenes. The floor driver leaves
 # out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
 # program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/ci.md) are rendered on both drivers.
 #
@@ -130,12 +130,12 @@ if cargo fmt --version >/dev/null 2>&1; then
   rustfmt --edition 2024 --check src/scene/lights/*.rs src/realtime/passes/*.rs
 fi
 . scripts/linting-compiler.sh
-say "lints of benchmarks, examples and the library"
+say "lints of benchmarks and examples"
 cargo build --locked --benches --examples
-if cargo clippy --version >/dev/null 2>&1; then
-  # the library alone; and before a release the program without benchmarks and viewer
+if [ -n "$full" ] && cargo clippy --version >/dev/null 2>&1; then
+  # the library alone, and the program without benchmarks and viewer
   cargo clippy --locked --no-default-features --lib -- -D warnings
-  if [ -n "$full" ]; then cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings; fi
+  cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings
 fi
 
 # rays of each set of the parity gate; a million otherwise
