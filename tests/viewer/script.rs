@@ -197,7 +197,7 @@ wait text:Black
 screenshot FOLDER/black.png
 key F
 wait text:framed what can be seen
-wait 1
+wait 3
 screenshot FOLDER/framed.png
 wheel 200 200 -12
 wait text:Black
@@ -208,7 +208,7 @@ wait text:the light stays
 drop FOLDER/sky.exr
 wait text:environment: FOLDER/sky.exr
 wheel 200 200 -12
-wait 2
+wait 8
 screenshot FOLDER/lit.png";
     std::fs::write(&script, text.replace("FOLDER", &folder.path().to_string_lossy())).unwrap();
     let mut options = options(Some("builtin:closed-box"));
