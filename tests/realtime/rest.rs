@@ -7,7 +7,7 @@ use skylit::scene::Projection;
 use skylit::tracer::TracerKind;
 
 use crate::common::{
-    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, record, scene, tracer, tracers,
+    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, is_full, record, scene, tracer, tracers,
 };
 use crate::{NO_FILTER, SIZE, assert_sound, bits, frames, realtime, rmse, stepped, traced};
 
@@ -75,7 +75,8 @@ fn gpu_long_frames_at_rest_converge_to_what_short_ones_do() {
     let mut flat = scene.cameras[0].clone();
     flat.projection = Projection::Orthographic { half_height: 2.0 };
     let pixels = u64::from(SIZE[0] * SIZE[1]);
-    for camera in [stepped(&scene, SIZE, DVec3::ZERO), record(&scene, &flat, SIZE)] {
+    let perspective = stepped(&scene, SIZE, DVec3::ZERO);
+    for camera in [perspective, record(&scene, &flat, SIZE)] {
         let settings = Settings { antialias: true, converge: true, rest_samples: 256, ..traced(Preset::Fast) };
         let many = Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
         let quick = tracer(&device, TracerKind::Compute, &scene);
@@ -86,6 +87,11 @@ fn gpu_long_frames_at_rest_converge_to_what_short_ones_do() {
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &scene);
             for settings in [settings, Settings { resolution: Resolution::Half, ..settings }] {
+                // what is seen is one image on all tracers; the other cases on one of them
+                let is_first = settings.resolution == Resolution::Full && camera == perspective;
+                if !is_first && kind != TracerKind::Compute && !is_full() {
+                    continue;
+                }
                 let mut realtime = realtime(&tracer, SIZE, &settings);
                 let last = realtime.frames_to_rest().unwrap();
                 assert!(last < settings.frames_to_rest().unwrap() / 4, "{kind}: {last} frames");

@@ -33,7 +33,7 @@ fn gpu_a_session() {
     let sections = run(
         Some("builtin:stairs"),
         folder.path(),
-        "wait picture 90
+        "wait picture 500
 screenshot FOLDER/first.png
 mark orbit
 drag 200 200 320 240 1
@@ -83,14 +83,14 @@ wait 1",
 #[test]
 fn gpu_tracers_are_switched_while_it_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "wait picture 90
+    let text = "wait picture 500
 click Device
 click Tracer
 click pipeline
 wait text:Tracer pipeline
-wait settled 90
+wait settled 500
 key X
-wait compared 90
+wait compared 500
 click Tracer
 click query
 key Ctrl+S
@@ -104,11 +104,11 @@ key X
 click Tracer
 click compute
 wait text:Tracer compute
-wait settled 90
+wait settled 500
 expect-no-errors";
     let available = crate::common::tracers(&crate::common::device());
     let text: Vec<&str> = text.lines().collect();
-    let text = if available.len() == 3 { text.join("\n") } else { "wait picture 90\nexpect-no-errors".into() };
+    let text = if available.len() == 3 { text.join("\n") } else { "wait picture 500\nexpect-no-errors".into() };
     let sections = run(Some("builtin:cornell-box"), folder.path(), &text).unwrap();
     assert!(sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(), "{sections:?}");
     assert_eq!(folder.path().join("query.png").exists(), available.len() == 3, "what is to be saved waits for an image");
@@ -131,13 +131,13 @@ fn gpu_images_follow_the_geometry_and_are_watched() {
         }
     };
     let script = "wait text:primitives in
-wait picture 90
+wait picture 500
 screenshot FOLDER/geometry.png
 wait text:loaded the images
 screenshot FOLDER/images.png
 mark changed
 wait text:primitives in
-wait settled 90
+wait settled 500
 expect-no-errors";
     let sections = std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -191,7 +191,7 @@ fn gpu_black_views_are_left() {
     skylit::output::save(&sky, &folder.path().join("sky.exr")).unwrap();
     std::fs::write(folder.path().join("broken.hdr"), "no image").unwrap();
     let script = folder.path().join("script.txt");
-    let text = "wait picture 90
+    let text = "wait picture 500
 wheel 200 200 -12
 wait text:Black
 screenshot FOLDER/black.png
