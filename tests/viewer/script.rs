@@ -201,10 +201,10 @@ wait 3
 screenshot FOLDER/framed.png
 wheel 200 200 -12
 wait text:Black
-key Ctrl+R
-wait text:framed what can be seen
 drop FOLDER/broken.hdr
 wait text:the light stays
+key Ctrl+R
+wait text:framed what can be seen
 drop FOLDER/sky.exr
 wait text:environment: FOLDER/sky.exr
 wheel 200 200 -12
