@@ -164,7 +164,7 @@ fn gpu_the_viewer_goes_on_after_a_device_was_lost() {
     };
     let view = |script: &str, fault: &str| {
         std::fs::write(at("script"), script).unwrap();
-        let args = ["view", "builtin:stairs", "--size", "760x520", "--headless-script", &at("script")];
+        let args = ["view", "builtin:stairs", "--size", "520x400", "--headless-script", &at("script")];
         skylit(&args).env("SKYLIT_FAULT_DEVICE_LOST", fault).output().unwrap()
     };
     // the device is lost once there is the screenshot
