@@ -1,4 +1,4 @@
-//! Which files a command reads and which it will write: no output takes the place of an input, or of another output.
+//! Which files a command reads and which it will write: no output takes the place of an input, or of another output. Folders that it makes for them go again if nothing comes.
 //!
 //! Files are compared by what they are, not by how they are spelled: `a.png` and `./a.png`, a link and what it points to, and two hard links to one file are the same.
 

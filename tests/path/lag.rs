@@ -76,7 +76,7 @@ fn gpu_frames_thin_shadows_move() {
     let darkened: Vec<usize> = (0..now.len()).filter(|&k| now[k] > 0.0 && now[k] < 0.5 * past[k]).collect();
     assert!(darkened.len() >= 8, "{} pixels", darkened.len());
     let tracer = tracer(&device, TracerKind::Compute, &flat);
-    for (preset, least) in [(Preset::Fast, 0.5), (Preset::Balanced, 0.65), (Preset::Quality, 0.65)] {
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Quality] {
         let kept = (1..=3).map(|seed| {
             let mut frames = frames(&tracer, &flat, preset, seed);
             for frame in 0..=LAST {
@@ -92,7 +92,7 @@ fn gpu_frames_thin_shadows_move() {
         });
         let kept = kept.sum::<f64>() / 3.0;
         println!("{preset}: {kept:.2} of the contrast of a shadow in {} pixels", darkened.len());
-        assert!((least..1.3).contains(&kept), "{preset}: {kept}");
+        assert!((0.7..1.3).contains(&kept), "{preset}: {kept}");
     }
     assert_validation_clean(&device);
 }
