@@ -88,18 +88,20 @@ struct MaterialTextures {
     vec4 at[TEXTURE_FEATURES_COUNT];
 };
 
+// Value of one of the material's textures at a surface, 1 without a texture.
+vec4 look_up_one(uint use, Surface s, SubmeshRecord submesh, float log_side) {
+    const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
+    uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
+    return has_use(use) ? sample_use(SHADING_OF(submesh.material).uses[use], submesh, s.primitive, s.uv, kind, log_side) : vec4(1.0);
+}
+
 MaterialTextures look_up(Surface s, SubmeshRecord submesh, float log_side) {
     MaterialTextures found;
-    const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
-    uint m = submesh.material;
     [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) found.at[use] = vec4(1.0);
     // drivers compile a copy of the body below for every texture before they find that no material has it
     if (TEXTURE_FEATURES_0 == 0u) return found;
     // all places are constants once it is unrolled: CPU drivers write to others lane by lane
-    [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) {
-        uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
-        if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], submesh, s.primitive, s.uv, kind, log_side);
-    }
+    [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) found.at[use] = look_up_one(use, s, submesh, log_side);
     return found;
 }
 

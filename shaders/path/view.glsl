@@ -17,7 +17,8 @@ vec3 surface_albedo(Surface s, float log_side) {
 // Ambient visibility by the material's occlusion texture, weighted by its strength; 1 without one.
 float baked_visibility(Surface s, float log_side) {
     SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
-    return 1.0 + SHADING_OF(submesh.material).occlusion_strength * (look_up(s, submesh, log_side).at[USE_OCCLUSION].r - 1.0);
+    float visibility = look_up_one(USE_OCCLUSION, s, submesh, log_side).r;
+    return 1.0 + SHADING_OF(submesh.material).occlusion_strength * (visibility - 1.0);
 }
 
 vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {

@@ -55,8 +55,9 @@ void main() {
 #ifdef STREAM_ANY
     any(push.first + k, met);
 #else
-    if (met) closest(push.first + k, scene_hit(best, best_instance, best_primitive, best_uv));
-    else closest(push.first + k, miss());
+    Hit hit = miss();
+    if (met) hit = scene_hit(best, best_instance, best_primitive, best_uv);
+    closest(push.first + k, hit);
 #endif
 }
 

@@ -1,7 +1,6 @@
 // Last step of a launch of the fast kernel: delivers the hits to the stream.
 #ifndef TRACE_DELIVER
 #define TRACE_DELIVER
-#include "trace/callback.glsl"
 #include "trace/launch.glsl"
 #include "trace/spread.glsl"
 
@@ -11,14 +10,13 @@ void main() {
     uint k = ray_of_dispatch();
     if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
-    if (!is_finished(root, k)) {
-        deliver_miss(push.first + k);
-        return;
-    }
+    // one call for hits and misses: the stream's code, which may be all of a path's, is compiled once for each call
 #ifdef STREAM_ANY
-    any(push.first + k, load_any(root, k));
+    any(push.first + k, is_finished(root, k) && load_any(root, k));
 #else
-    closest(push.first + k, load_closest(root, k));
+    Hit hit = miss();
+    if (is_finished(root, k)) hit = load_closest(root, k);
+    closest(push.first + k, hit);
 #endif
 }
 

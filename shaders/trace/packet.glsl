@@ -12,7 +12,6 @@
 #define TRACE_PACKET
 #include "scene/corners.glsl"
 #include "trace/block.glsl"
-#include "trace/callback.glsl"
 #include "trace/leaf.glsl"
 #include "trace/reduce.glsl"
 #include "trace/slab.glsl"

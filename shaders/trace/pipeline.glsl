@@ -2,7 +2,6 @@
 #ifndef TRACE_PIPELINE
 #define TRACE_PIPELINE
 #include "scene/scene.glsl"
-#include "trace/callback.glsl"
 #include "trace/payload.glsl"
 
 layout(location = 0) rayPayloadEXT Payload payload;
@@ -15,11 +14,9 @@ void main() {
     if (k >= ray_count()) return;
     uint index = push.first + k;
     Ray world = ray(index);
-    if (!is_ray(world) || !is_finite(world)) {
-        deliver_miss(index);
-        return;
-    }
-    payload.t = 0.0;
+    bool traces = is_ray(world) && is_finite(world);
+    // what the miss shader stores
+    payload.t = traces ? 0.0 : INFINITY;
     payload.instance = INVALID;
     payload.primitive = INVALID;
     payload.u = 0.0;
@@ -30,13 +27,17 @@ void main() {
 #else
     const uint flags = gl_RayFlagsNoneEXT;
 #endif
-    traceRayEXT(accelerationStructureEXT(SceneRoot(push.scene).top_level), flags, 0xffu, 0, 1, 0, world.origin, world.tmin,
-        world.direction, world.tmax, 0);
+    if (traces) {
+        traceRayEXT(accelerationStructureEXT(SceneRoot(push.scene).top_level), flags, 0xffu, 0, 1, 0, world.origin, world.tmin,
+            world.direction, world.tmax, 0);
+    }
+    // one call for hits and misses: the stream's code, which may be all of a path's, is compiled once for each call
 #ifdef STREAM_ANY
     any(index, payload.t < INFINITY);
 #else
-    if (payload.t < INFINITY) closest(index, scene_hit(payload.t, payload.instance, payload.primitive, vec2(payload.u, payload.v)));
-    else deliver_miss(index);
+    Hit hit = miss();
+    if (payload.t < INFINITY) hit = scene_hit(payload.t, payload.instance, payload.primitive, vec2(payload.u, payload.v));
+    closest(index, hit);
 #endif
 }
 

@@ -156,8 +156,9 @@ void main() {
 #ifdef STREAM_ANY
             any(index, met);
 #else
-            if (met) closest(index, scene_hit(best, best_instance, best_primitive, best_uv));
-            else closest(index, miss());
+            Hit hit = miss();
+            if (met) hit = scene_hit(best, best_instance, best_primitive, best_uv);
+            closest(index, hit);
 #endif
             left--;
             next += LANES;

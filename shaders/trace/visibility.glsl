@@ -4,7 +4,6 @@
 #ifndef TRACE_VISIBILITY
 #define TRACE_VISIBILITY
 #include "common/camera.glsl"
-#include "trace/callback.glsl"
 #include "trace/rasterized.glsl"
 
 layout(local_size_x = LANES) in;
@@ -13,22 +12,22 @@ void main() {
     if (gl_GlobalInvocationID.x >= ray_count()) return;
     uint index = push.first + gl_GlobalInvocationID.x;
     Ray world = ray(index);
-    if (!is_ray(world)) {
-        deliver_miss(index);
-        return;
+    uvec2 rasterized = uvec2(0u);
+    if (is_ray(world)) {
+        BlockParams p = BlockParams(push.pass);
+        uvec2 pixel = block_pixel(p, pixel_index(index));
+        rasterized = Pairs(push.rays).v[pixel.y * p.block_size.x + pixel.x];
     }
-    BlockParams p = BlockParams(push.pass);
-    uvec2 pixel = block_pixel(p, pixel_index(index));
-    uvec2 rasterized = Pairs(push.rays).v[pixel.y * p.block_size.x + pixel.x];
-    if (rasterized.x == 0u) {
-        deliver_miss(index);
-        return;
+    Hit hit = miss();
+    if (rasterized.x != 0u) {
+        uint tlas_instance = rasterized.x - 1u;
+        float t;
+        vec2 uv;
+        intersect_rasterized(world, tlas_instance, rasterized.y, t, uv);
+        hit = scene_hit(t, tlas_instance, rasterized.y, uv);
     }
-    uint tlas_instance = rasterized.x - 1u;
-    float t;
-    vec2 uv;
-    intersect_rasterized(world, tlas_instance, rasterized.y, t, uv);
-    closest(index, scene_hit(t, tlas_instance, rasterized.y, uv));
+    // one call for hits and misses: the stream's code, which may be all of a path's, is compiled once for each call
+    closest(index, hit);
 }
 
 #endif

@@ -444,6 +444,12 @@ impl App {
         self.failure.is_some() || self.loading.is_none() && self.idle >= self.sent_number
     }
 
+    /// Samples of each pixel of the first image, if it is one of what was requested last; otherwise 0.
+    pub fn shown_samples(&self) -> u32 {
+        let progress = self.panes[0].progress.as_ref().filter(|p| self.loading.is_none() && p.request >= self.sent_number);
+        progress.map_or(0, |p| p.step.samples)
+    }
+
     /// Whether the truth is being rendered.
     pub fn compares_now(&self) -> bool {
         self.compares || self.needs_second() && matches!(self.second, Second::Truth | Second::HeatMap)

@@ -27,6 +27,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
         "wait picture|settled [SECONDS]",
         "until the first image has a picture, or all have settled; at most so long [120]; fails at once where a scene or an image cannot be had",
     ),
+    ("wait samples N [SECONDS]", "until the first image has N samples of each pixel, or has settled; at most so long [120]"),
     ("wait compared [SECONDS]", "until there is a comparison with the truth"),
     ("wait text:TEXT", "until a control or label contains the text; at most 120 seconds"),
     ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
@@ -75,6 +76,7 @@ enum Command {
 enum Condition {
     Picture,
     Settled,
+    Samples(u32),
     Compared,
     Text(String),
 }
@@ -84,6 +86,7 @@ impl Condition {
         match self {
             Self::Picture => "a picture".into(),
             Self::Settled => "images that have settled".into(),
+            Self::Samples(count) => format!("an image of {count} samples of each pixel"),
             Self::Compared => "a comparison".into(),
             Self::Text(text) => format!("the text \"{text}\""),
         }
@@ -319,6 +322,7 @@ impl Script {
                 let holds = match condition {
                     Condition::Picture => app.panes[0].progress.is_some(),
                     Condition::Settled => app.is_settled(),
+                    Condition::Samples(count) => app.shown_samples() >= *count || app.is_settled(),
                     Condition::Compared => app.comparison.is_some(),
                     Condition::Text(text) => self.contains(text),
                 };
@@ -587,6 +591,10 @@ fn parse(line: &str) -> Option<Command> {
         "wait" => match *words.first()? {
             "picture" => Command::WaitFor(Condition::Picture, patience(1)?),
             "settled" => Command::WaitFor(Condition::Settled, patience(1)?),
+            "samples" => {
+                let count = words.get(1)?.parse().ok().filter(|count| *count > 0)?;
+                Command::WaitFor(Condition::Samples(count), patience(2)?)
+            }
             "compared" => Command::WaitFor(Condition::Compared, patience(1)?),
             text if text.starts_with("text:") => {
                 let text = rest.strip_prefix("text:")?;
@@ -651,6 +659,9 @@ mod tests {
     fn commands_are_read() {
         let of = |line: &str| parse(line);
         assert_eq!(of("wait 0.5"), Some(Command::Wait(Duration::from_millis(500))));
+        assert_eq!(of("wait samples 32"), Some(Command::WaitFor(Condition::Samples(32), PATIENCE)));
+        assert_eq!(of("wait samples 8 7"), Some(Command::WaitFor(Condition::Samples(8), Duration::from_secs(7))));
+        assert!(of("wait samples").is_none() && of("wait samples 0").is_none() && of("wait samples many").is_none());
         assert_eq!(of("wait settled 7"), Some(Command::WaitFor(Condition::Settled, Duration::from_secs(7))));
         assert_eq!(of("wait text:Open a scene"), Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE)));
         assert_eq!(of("key Ctrl+S"), Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO)));

@@ -170,8 +170,8 @@ fn gpu_the_viewer_goes_on_after_a_device_was_lost() {
     };
     // the device is lost once there is the screenshot
     let script = format!(
-        "wait picture\ndrag 300 200 380 240 0.5\nclick Radius\nset Radius = 0.6\nwait settled 400\n{}screenshot {}\nset Radius = 0.5\n\
-         set Radius = 0.6\nwait text:started again\nwait settled 400\n{}",
+        "wait picture\ndrag 300 200 380 240 0.5\nclick Radius\nset Radius = 0.6\nwait samples 8 400\n{}screenshot {}\nset Radius = 0.5\n\
+         set Radius = 0.6\nwait text:started again\nwait samples 8 400\n{}",
         save("kept.exr"),
         at("lost.png"),
         save("lost.exr")
@@ -198,8 +198,8 @@ fn gpu_a_display_with_another_scale() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| place(&dir, name);
     let script = format!(
-        "wait picture\nclick Radius\nset Radius = 0.6\nwait settled 200\nscreenshot {}\nscale 2\nwait 0.5\nwait settled 400\nscreenshot {}\n\
-         scale 1.25\nwait 0.5\nscale 1\nwait 0.5\nwait settled 200\nscreenshot {}\nexpect-no-errors\n",
+        "wait picture\nclick Radius\nset Radius = 0.6\nwait samples 32 400\nscreenshot {}\nscale 2\nwait 0.5\nwait samples 32 400\nscreenshot {}\n\
+         scale 1.25\nwait 0.5\nscale 1\nwait 0.5\nwait samples 32 400\nscreenshot {}\nexpect-no-errors\n",
         at("one.png"),
         at("two.png"),
         at("back.png")
@@ -270,8 +270,12 @@ fn host_memory_that_runs_out() {
     let dir = tempfile::tempdir().unwrap();
     let file = place(&dir, "a.glb");
     let export = ["export", "builtin:terrain:2000000", &file];
-    // the program itself takes 60,000; a little more is enough to start, and too little for threads
-    for kib in [(70_000..90_000).step_by(2_000).collect(), vec![100_000, 140_000]].concat() {
+    // what the program itself takes depends on how it was optimised; a little more is enough to start, and too little for threads
+    let starts = |kib: &u64| limited(*kib, &["-V"]).status.success();
+    let least: u64 = (40_000..400_000).step_by(2_000).find(starts).expect("the program starts somewhere");
+    for kib in
+        [(8_000..28_000).step_by(2_000).collect(), vec![40_000, 80_000]].concat().into_iter().map(|more: u64| least + more)
+    {
         let out = limited(kib, &export);
         ends(&out, 5, "out of memory: the system has no ");
         assert_eq!((count(dir.path()), stderr(&out).lines().count()), (0, 1), "{}", stderr(&out));
@@ -470,8 +474,9 @@ fn gpu_signals_at_any_time() {
             (Some(0), _) => {}
             other => panic!("{name} after {k} tenths: {other:?} {text}"),
         }
-        if out.status.success() {
-            assert_eq!(std::fs::read(&exr).unwrap(), whole);
+        // a signal may come when all is written, and the program is about to end
+        if out.status.success() || Path::new(&exr).exists() {
+            assert_eq!(std::fs::read(&exr).unwrap(), whole, "{name} after {k} tenths");
             std::fs::remove_file(&exr).unwrap();
         }
         assert_eq!(names(dir.path()), Vec::<OsString>::new(), "{name} after {k} tenths");

@@ -228,7 +228,7 @@ fn gpu_frames_forget_what_has_changed_and_no_more() {
 /// What a camera that jumps uncovers has five paths, without bias, and others of each seed; in all tracers the same pixels have them, also where the pixels of a frame fill a launch.
 #[test]
 fn gpu_frames_uncovered_pixels_have_more_paths() {
-    const SEEDS: u32 = 24;
+    const SEEDS: u32 = 12;
     let all = SIZE.map(|n| n.next_multiple_of(8)).iter().product();
     let device = device();
     let scene = scene("cornell-box");
@@ -240,8 +240,8 @@ fn gpu_frames_uncovered_pixels_have_more_paths() {
     let mut uncovered: Option<Vec<bool>> = None;
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
-        let truth = PathIntegrator::new(&tracer, &flat, &options(2048)).unwrap();
-        let truth = { truth }.render(&tracer, &jumped, 2048, 9, &mut NoControl).unwrap().image.film.mean;
+        let truth = PathIntegrator::new(&tracer, &flat, &options(1024)).unwrap();
+        let truth = { truth }.render(&tracer, &jumped, 1024, 9, &mut NoControl).unwrap().image.film.mean;
         let (mut squares, mut differences) = ([0.0, 0.0], Vec::new());
         for seed in 0..SEEDS {
             let [with_history, plain] = [32, 1].map(|history| {
@@ -521,7 +521,7 @@ fn gpu_frames_continue_in_another_size() {
     let device = device();
     let scene = scene("cornell-box");
     let flat = FlatScene::for_paths(&scene);
-    let (full, half) = ([64, 36], [32, 18]);
+    let (full, half) = ([48, 28], [24, 14]);
     let camera = |size: [u32; 2], step: f64| {
         let mut camera = scene.cameras[0].clone();
         camera.camera_to_world *= glam::DAffine3::from_translation(glam::DVec3::X * step);

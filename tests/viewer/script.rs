@@ -88,7 +88,7 @@ click Device
 click Tracer
 click pipeline
 wait text:Tracer pipeline
-wait settled 500
+wait samples 8 500
 key X
 wait compared 500
 click Tracer
@@ -104,7 +104,7 @@ key X
 click Tracer
 click compute
 wait text:Tracer compute
-wait settled 500
+wait samples 8 500
 expect-no-errors";
     let available = crate::common::tracers(&crate::common::device());
     let text: Vec<&str> = text.lines().collect();
@@ -137,7 +137,7 @@ wait text:loaded the images
 screenshot FOLDER/images.png
 mark changed
 wait text:primitives in
-wait settled 500
+wait samples 8 500
 expect-no-errors";
     let sections = std::thread::scope(|scope| {
         scope.spawn(|| {

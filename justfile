@@ -1,0 +1,33 @@
+# What contributors run; CONTRIBUTING.md explains each. `just` alone lists them.
+
+_list:
+    @just --list --unsorted
+
+# sets up, builds, renders and compares
+demo:
+    ./scripts/demo.sh
+
+# all tests, or those whose name contains NAME
+test NAME="":
+    ./scripts/test.sh {{ NAME }}
+
+# what takes hours, before a release
+full:
+    ./scripts/test.sh --full
+
+# what continuous integration runs
+ci:
+    ./.ci/run
+
+# formatting and lints
+lint:
+    cargo fmt --check
+    cargo clippy --locked --all-targets -- -D warnings
+
+# documentation of the library
+docs:
+    cargo doc --locked --no-deps --document-private-items
+
+# a kit for a machine with a GPU
+gpu:
+    ./scripts/gpu.sh
