@@ -521,7 +521,7 @@ fn gpu_frames_continue_in_another_size() {
     let device = device();
     let scene = scene("cornell-box");
     let flat = FlatScene::for_paths(&scene);
-    let (full, half) = ([48, 28], [24, 14]);
+    let (full, half) = ([64, 36], [32, 18]);
     let camera = |size: [u32; 2], step: f64| {
         let mut camera = scene.cameras[0].clone();
         camera.camera_to_world *= glam::DAffine3::from_translation(glam::DVec3::X * step);
