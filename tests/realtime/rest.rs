@@ -183,11 +183,11 @@ fn gpu_an_interrupted_image_converges() {
     let device = device();
     let scene = scene("stairs");
     let camera = stepped(&scene, SIZE, DVec3::ZERO);
-    let settings = Settings { antialias: true, converge: true, launch_rays: 20_000, rest_samples: 128, ..traced(Preset::Fast) };
+    let settings = Settings { antialias: true, converge: true, launch_rays: 20_000, rest_samples: 256, ..traced(Preset::Fast) };
     let many = Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
     let quick = tracer(&device, TracerKind::Compute, &scene);
     let mut truth = realtime(&quick, SIZE, &many);
-    frames(&mut truth, &quick, &camera, 32);
+    frames(&mut truth, &quick, &camera, 64);
     let (truth, all) = (truth.result().unwrap(), vec![1.0; (SIZE[0] * SIZE[1]) as usize]);
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
@@ -204,7 +204,7 @@ fn gpu_an_interrupted_image_converges() {
             let to_rest = realtime.frames_to_rest().unwrap();
             frames(&mut realtime, &tracer, &camera, to_rest);
             let samples = realtime.shown_samples();
-            assert!((110..180).contains(&samples), "{kind}: {samples}");
+            assert!((240..300).contains(&samples), "{kind}: {samples}");
             assert_sound(&kind.to_string(), &realtime);
             rmse(&realtime.result().unwrap(), &truth, &all)
         });
