@@ -52,6 +52,27 @@ vec2 sample_spherical_triangle(SphericalTriangle s, LightRecord light, vec3 from
     return b.x + b.y > 1.0 ? b / (b.x + b.y) : b;
 }
 
+uint five_bits(uint flags, uint at) { return flags >> at & LIGHT_FIVE_BITS; }
+
+// Barycentrics in its triangle of a point of a part of it (src/integrators/path/lights/pictures.rs).
+vec2 in_whole(LightRecord light, vec2 b) {
+    uint side = five_bits(light.flags, LIGHT_SIDE_AT);
+    if (!has_use(USE_EMISSION) || side == 0u) return b;
+    vec2 cell = vec2(five_bits(light.flags, LIGHT_ROW_AT), five_bits(light.flags, LIGHT_COLUMN_AT));
+    return ((light.flags & LIGHT_TURNED) != 0u ? cell + 1.0 - b : cell + b) / float(side);
+}
+
+// Number of the part that has a point of a triangle. light: the first part, or the triangle.
+uint part_at(LightRecord light, vec2 b) {
+    uint side = five_bits(light.flags, LIGHT_SIDE_AT);
+    if (!has_use(USE_EMISSION) || side == 0u) return 0u;
+    vec2 s = b * float(side);
+    uint row = min(uint(s.x), side - 1u);
+    uint column = min(uint(s.y), side - 1u - row);
+    bool turned = s.x - float(row) + (s.y - float(column)) > 1.0 && row + column + 1u < side;
+    return side * side - (side - row) * (side - row) + 2u * column + (turned ? 1u : 0u);
+}
+
 LightSample triangle_sample(PathParams p, LightRecord light, vec3 from, Shading m, vec2 u) {
     SphericalTriangle s = spherical_triangle(light, from);
     // Heitz, "A Low-Distortion Map Between Triangle and Square", 2019
@@ -59,8 +80,9 @@ LightSample triangle_sample(PathParams p, LightRecord light, vec3 from, Shading 
     if (is_wide(s)) b = sample_spherical_triangle(s, light, from, u);
     LightSample l;
     if (!flat_light_point(light, from, b, l)) return l;
-    l.radiance *= emission_texture(light.instance, light.primitive, b);
-    if (HAS_ALPHA && (light.flags & LIGHT_ALPHA) != 0u) l.radiance *= emitter_alpha(light.instance, light.primitive, b);
+    vec2 at = in_whole(light, b);
+    l.radiance *= emission_texture(light.instance, light.primitive, at);
+    if (HAS_ALPHA && (light.flags & LIGHT_ALPHA) != 0u) l.radiance *= emitter_alpha(light.instance, light.primitive, at);
     l.pdf = triangle_density(light, s, l.distance, l.wi);
     return l;
 }

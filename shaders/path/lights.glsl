@@ -115,6 +115,8 @@ float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi, LightShares share
     if (k == INVALID) return 0.0;
     LightRecord light = p.only_light;
     if (WITH_LIGHT_GROUPS || WITH_LIGHT_TREE) light = load_light_record(p.lights, k);
+    uint part = part_at(light, vec2(hit.u, hit.v));
+    if (part != 0u) light = load_light_record(p.lights, k + part);
     float probability = shares.placed;
     if (WITH_LIGHT_TREE) {
         float u = 0.0;

@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, LazyLock};
 
+use glam::Vec2;
+
 use crate::colour::srgb_decode;
 pub use crate::interface::Wrap;
 
@@ -127,4 +129,25 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// Interpolation.
     pub filter: Filter,
+}
+
+impl Texture {
+    /// Index of the texel that a point lies in. `uv`: any texture coordinates, v down.
+    pub fn texel_at(&self, uv: Vec2) -> usize {
+        let along = |u: f32, size: u32, wrap: Wrap| {
+            let n = i64::from(size.max(1));
+            // the cast saturates; NaN becomes 0
+            let i = (f64::from(u) * n as f64).floor() as i64;
+            let inside = match wrap {
+                Wrap::Repeat => i.rem_euclid(n),
+                Wrap::Clamp => i.clamp(0, n - 1),
+                Wrap::Mirror => {
+                    let m = i.rem_euclid(2 * n);
+                    m.min(2 * n - 1 - m)
+                }
+            };
+            inside as usize
+        };
+        along(uv.y, self.height, self.wrap[1]) * self.width as usize + along(uv.x, self.width, self.wrap[0])
+    }
 }

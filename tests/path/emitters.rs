@@ -36,6 +36,43 @@ fn below(x: [f64; 2], z: [f64; 2]) -> f64 {
     RHO * 4.0 * skylit::oracle::closed_form::polygon_form_factor(DVec3::ZERO, DVec3::Y, &corners).abs()
 }
 
+/// A panel of which one texel of 256 is bright: the floor gets its light and no other, and few light samples find it.
+#[test]
+fn gpu_panels_are_sampled_by_their_pictures() {
+    let device = device();
+    let (x, z) = ([-0.3, 1.3], [-0.4, 0.6]);
+    let (column, row) = (5, 9);
+    let mut texels = vec![0u8; 4 * 256];
+    texels[4 * (16 * row + column)..][..4].fill(255);
+    let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY };
+    let mut scene = floor_and(vec![(panel(x, z), Material { emissive_texture: Some(slot), ..emitter(4.0) })]);
+    scene.textures.push(Texture {
+        name: String::new(),
+        width: 16,
+        height: 16,
+        texels: texels.into(),
+        wrap: [Wrap::Clamp; 2],
+        filter: Filter::Nearest,
+    });
+    let texel = |range: [f64; 2], k: usize| [k, k + 1].map(|k| range[0] + (range[1] - range[0]) * k as f64 / 16.0);
+    let expected = below(texel(x, column), texel(z, row));
+    let flat = FlatScene::for_paths(&scene);
+    for kind in picked(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        for strategy in [Strategy::Mis, Strategy::Light] {
+            let film = render(&tracer, &flat, &options(strategy, 64)).image.film;
+            let values: Vec<f64> = film.mean.iter().map(|v| f64::from(*v)).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let error = (values.iter().map(|v| (v - expected).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
+            println!("{kind}, {strategy:?}: {mean:.6}, {expected:.6} by its form factor, RMSE {:.3} of it", error / expected);
+            assert!((mean / expected - 1.0).abs() < 0.02, "{kind}, {strategy:?}: {mean}, not {expected}");
+            // two without parts
+            assert!(error < 0.3 * expected, "{kind}, {strategy:?}: {error} of {expected}");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
 /// Light samples of an emitter count what of it is there: half of it by a mask, a share of it by coverage, nothing of one whose alpha is 0.
 #[test]
 fn gpu_emitters_are_there_as_their_alpha_says() {

@@ -8,6 +8,16 @@ records! {
         LIGHT_MIRRORED: uint = 2;
         /// Flag of a triangle: its material has alpha, which scales what it emits.
         LIGHT_ALPHA: uint = 4;
+        /// First of five bits in the flags of a triangle that is part of one with a picture: number of parts along an edge; 0: it is whole.
+        LIGHT_SIDE_AT: uint = 8;
+        /// First of five bits: cells before the part along the first edge.
+        LIGHT_ROW_AT: uint = 13;
+        /// First of five bits: cells before the part along the second edge.
+        LIGHT_COLUMN_AT: uint = 18;
+        /// Mask of five bits.
+        LIGHT_FIVE_BITS: uint = 31;
+        /// Flag of a part: it is turned around, its corner is opposite to that of its cell.
+        LIGHT_TURNED: uint = 0x80_0000;
         /// Flag of `LightNode.link`: the node is a leaf.
         LIGHT_LEAF: uint = 0x8000_0000;
         /// Flag of `LightNode.link`: the lights emit along the axis and against it.
@@ -46,7 +56,7 @@ records! {
         instance: uint,
         /// Triangle, rectangle, sphere: index in the instance's mesh; environment: number of portals, whose records follow it.
         primitive: uint,
-        /// Flags `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
+        /// Flags `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`, and those of parts.
         flags: uint,
         /// Triangle, rectangle, sphere: distance from its surface at which a light sample ends, scene units: a bound on rounding, so that the shadow ray does not
         /// hit the light itself.

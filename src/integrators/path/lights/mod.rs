@@ -7,6 +7,7 @@
 //! samples do not tell of it.
 
 pub(super) mod device;
+mod pictures;
 mod portals;
 mod punctual;
 mod surfaces;

@@ -6,11 +6,12 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
+use super::pictures::{self, Part, Picture};
 use super::{LightBuilder, LightCollector, brightness};
 use crate::accel::features::AlphaClass;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightRecord};
-use crate::scene::{AlphaMode, Geometry, Material, Scene, TriangleMesh};
+use crate::scene::{AlphaMode, Geometry, Material, Mesh, Scene, TriangleMesh};
 
 /// Bound of the rounding error of a point on a light, as a fraction of its coordinates.
 const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
@@ -19,6 +20,7 @@ const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 /// it.
 pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &Scene) -> Vec<u32> {
     let LightBuilder { origin, alpha, moves, means, .. } = builder;
+    let side = pictures::side(triangles_with_pictures(scene, moves));
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
@@ -35,12 +37,14 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
             ..Default::default()
         };
         let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(scene, texture));
-        let mut brightness =
-            brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let of_textures = brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
         let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
-        if is_tested {
-            brightness *= mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w);
-        }
+        let alpha_factor = if is_tested {
+            mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w)
+        } else {
+            1.0
+        };
+        let brightness = of_textures * alpha_factor;
         let first = of_primitives.len();
         match &mesh.geometry {
             Geometry::Triangles(t) => {
@@ -50,7 +54,13 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                 // what moves may be a rectangle at times, but its lights are of one kind
                 let plain = material.emissive_texture.is_none() && !is_tested && !moves[i];
                 let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - *origin;
-                add_triangles(all, t, point, plain, brightness, LightRecord { flags, ..base }, &mut of_primitives);
+                let slot = material.emissive_texture.filter(|_| !moves[i]);
+                let picture = slot.map(|slot| Picture::new(scene, t, slot, material.emissive));
+                // none, one, or many lights of a triangle: in proportion to its own brightness, and alpha for all alike
+                let parts = |k: usize| picture.as_ref().map_or_else(Vec::new, |p| p.parts(k, side, of_textures));
+                let lights =
+                    add_triangles(all, t, point, plain, (brightness, alpha_factor), parts, LightRecord { flags, ..base });
+                of_primitives.extend(lights);
             }
             Geometry::Spheres(spheres) => {
                 let m = to_world.matrix3;
@@ -91,20 +101,33 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
     light_of
 }
 
-/// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are one light.
+/// Number of triangles at rest that emit what a texture says.
+fn triangles_with_pictures(scene: &Scene, moves: &[bool]) -> usize {
+    let shows = |mesh: &Mesh| {
+        let material = &scene.materials[mesh.material];
+        material.emissive != Vec3::ZERO && material.emissive_texture.is_some()
+    };
+    let at_rest = scene.instances.iter().zip(moves).filter(|(_, moves)| !**moves).map(|(i, _)| &scene.meshes[i.mesh]);
+    let triangles = |mesh: &Mesh| if let Geometry::Triangles(t) = &mesh.geometry { t.indices.len() } else { 0 };
+    at_rest.filter(|mesh| shows(mesh)).map(triangles).sum()
+}
+
+/// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are one light; one that has `parts` is as many. `brightness`: of all of it, and
+/// the factor that its alpha is of it. Returns the light of each triangle, the first of its parts.
 fn add_triangles(
     all: &mut LightCollector,
     mesh: &TriangleMesh,
     point: impl Fn(u32) -> DVec3,
     plain: bool,
-    brightness: f64,
+    (brightness, alpha_factor): (f64, f64),
+    parts: impl Fn(usize) -> Vec<Part>,
     base: LightRecord,
-    of_primitives: &mut Vec<u32>,
-) {
+) -> Vec<u32> {
+    let mut of_primitives = Vec::with_capacity(mesh.indices.len());
     let two_sided = base.flags & LIGHT_TWO_SIDED != 0;
     // a mirroring transform reverses the winding
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
-    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
+    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, flags: u32, brightness: f64| {
         let normal = turn * e1.cross(e2);
         let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
         let (b, c) = (a + e1, a + e2);
@@ -118,6 +141,7 @@ fn add_triangles(
             edge: e2.as_vec3().to_array(),
             primitive: primitive as u32,
             lift: (extent * ROUNDING_BOUND + slack) as f32,
+            flags: base.flags | flags,
             ..base
         };
         let bounds = Bounds {
@@ -136,15 +160,25 @@ fn add_triangles(
         let corners = mesh.indices[k].map(&point);
         let next = mesh.indices.get(k + 1).filter(|_| plain).map(|n| n.map(&point));
         if let Some((rectangle, slack)) = next.and_then(|next| rectangle(corners, next)) {
-            let index = push(Kind::Rectangle, rectangle, k, slack);
+            let index = push(Kind::Rectangle, rectangle, k, slack, 0, brightness);
             of_primitives.extend([index; 2]);
             k += 2;
             continue;
         }
         let [a, b, c] = corners;
-        of_primitives.push(push(Kind::Triangle, [a, b - a, c - a], k, 0.0));
+        let (e1, e2) = (b - a, c - a);
+        let mut part = |part: Part| {
+            let corner = a + part.corner.x * e1 + part.corner.y * e2;
+            let triangle = [corner, part.scale * e1, part.scale * e2];
+            push(Kind::Triangle, triangle, k, 0.0, part.flags, part.brightness * alpha_factor)
+        };
+        // they follow one another: shaders count from the first
+        let indices: Vec<u32> = parts(k).into_iter().map(&mut part).collect();
+        let first = indices.first().copied();
+        of_primitives.push(first.unwrap_or_else(|| push(Kind::Triangle, [a, e1, e2], k, 0.0, 0, brightness)));
         k += 1;
     }
+    of_primitives
 }
 
 /// The rectangle that two triangles form, as a corner and two edges, with the error of its corners; `None` if they form none.
