@@ -18,6 +18,8 @@ const uint DISTANT_LIGHT_ON = 3u; // the same of the sample of a distant light, 
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
 const float MAX_SURVIVAL = 0.95;
+// ... and a bounce off a mirror or through glass, which loses nothing: light that a body reflects within itself for a hundred bounces would weigh 1 / 0.95 for each of them.
+const float MAX_SPECULAR_SURVIVAL = 0.99;
 // Two media whose indices of refraction differ by a smaller share do not refract.
 const float MIN_REFRACTION = 1e-3;
 // How much of its length a shadow ray stays short of a light, beside what the light's own rounding asks.
@@ -314,7 +316,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if (WITH_LIGHT_SAMPLES && WITH_LIGHT_GROUPS && !splits) StoredFloats(p.placed_shares).v[k] = shares.placed;
         if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
         if (state.depth >= p.options.rr_depth) {
-            float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
+            float survival = min(brightest * state.eta_scale, b.delta ? MAX_SPECULAR_SURVIVAL : MAX_SURVIVAL);
             if (lobe.y >= survival) return added;
             state.throughput /= survival;
         }
