@@ -336,7 +336,7 @@ fn circles_of_files_are_small() {
         let is_tied = |f: &&str| TIED.iter().any(|t| f.starts_with(t));
         if files.len() > MAX_CIRCLE && !files.iter().all(is_tied) {
             wrong += &format!("\n{} files:\n", files.len());
-            circle.ties.iter().for_each(|(from, to, name)| wrong += &format!("  {from} uses {to} ({name})\n"));
+            circle.ties.iter().for_each(|(from, to, names)| wrong += &format!("  {from} uses {to} ({names})\n"));
         }
     }
     assert!(wrong.is_empty(), "circles of more than {MAX_CIRCLE} files:\n{wrong}");

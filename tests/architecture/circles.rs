@@ -1,7 +1,8 @@
 //! Circles of files: files of src/ that use one another, directly or through others.
 //!
-//! An edge leads from a file to each file that defines an item it names. A name that a module re-exports leads to the file
-//! that defines it, so a mod.rs that only declares and re-exports modules is in no circle.
+//! An edge leads from a file to each file that defines an item it names. A name that a module
+//! re-exports leads to the file that defines it, so a mod.rs that only declares and re-exports
+//! modules is in no circle.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -162,8 +163,8 @@ pub struct Crate {
     sources: BTreeMap<Names, Source>,
 }
 
-/// Which files use which, and the first name by which they do.
-type Edges = BTreeMap<Names, BTreeMap<Names, String>>;
+/// Which files use which, and the names by which they do.
+type Edges = BTreeMap<Names, BTreeMap<Names, BTreeSet<String>>>;
 
 impl Crate {
     pub fn add(&mut self, module: &[String], text: &str) -> syn::Result<()> {
@@ -171,8 +172,8 @@ impl Crate {
         Ok(())
     }
 
-    /// The path from the crate's root that `path` means in `module` of the file `file`; none where it is of another crate, or
-    /// of the file's own items.
+    /// The path from the crate's root that `path` means in `module` of the file `file`; none where
+    /// it is of another crate, or of the file's own items.
     fn absolute(&self, file: &[String], module: &[String], path: &[String]) -> Option<Names> {
         let join = |a: &[String], b: &[String]| Some(a.iter().chain(b).cloned().collect::<Names>());
         let up = path.iter().take_while(|n| *n == "super").count();
@@ -224,7 +225,7 @@ impl Crate {
             let own = edges.entry(file.clone()).or_default();
             let mut add = |target: Option<&Names>, path: &[String]| {
                 if let Some(target) = target.filter(|t| *t != file) {
-                    own.entry(target.clone()).or_insert_with(|| path.join("::"));
+                    own.entry(target.clone()).or_default().insert(path.join("::"));
                 }
             };
             for used in source.uses.iter().filter(|u| !u.is_reexport) {
@@ -255,7 +256,8 @@ impl Crate {
                 let circle: Vec<Names> = circle.into_iter().map(|i| files[i].clone()).collect();
                 let ties = circle.iter().flat_map(|from| {
                     let inner = edges[from].iter().filter(|(to, _)| circle.contains(to));
-                    inner.map(|(to, name)| (from.join("::"), to.join("::"), name.clone()))
+                    let list = |names: &BTreeSet<String>| names.iter().cloned().collect::<Vec<_>>().join(", ");
+                    inner.map(move |(to, names)| (from.join("::"), to.join("::"), list(names)))
                 });
                 circles.push(Circle { ties: ties.collect(), files: circle });
             }
@@ -282,7 +284,7 @@ fn reachable(used: &[Vec<usize>], start: usize) -> Vec<bool> {
 pub struct Circle {
     /// Modules of its files.
     pub files: Vec<Names>,
-    /// Which module uses which, and the first name by which it does.
+    /// Which module uses which, and the names by which it does.
     pub ties: Vec<(String, String, String)>,
 }
 
