@@ -46,7 +46,6 @@ const TIED: &[&str] = &[
     "src/scene/builtin",
     "src/scene/load",
     "src/stress",
-    "src/tracer",
     "src/verify",
     "src/viewer",
 ];
