@@ -38,7 +38,6 @@ const LAYERS: &[&[&str]] = &[
 /// Rooms and folders whose files are still in larger circles than `MAX_CIRCLE`.
 const TIED: &[&str] = &[
     "src/bench",
-    "src/gpu",
     "src/integrators",
     "src/output",
     "src/realtime",
