@@ -42,8 +42,6 @@ const TIED: &[&str] = &[
     "src/output",
     "src/realtime",
     "src/renderer",
-    "src/scene/builtin",
-    "src/scene/load",
     "src/stress",
     "src/verify",
     "src/viewer",
