@@ -42,7 +42,6 @@ const TIED: &[&str] = &[
     "src/output",
     "src/realtime",
     "src/renderer",
-    "src/stress",
     "src/verify",
 ];
 
