@@ -41,7 +41,6 @@ const TIED: &[&str] = &[
     "src/integrators",
     "src/output",
     "src/realtime",
-    "src/renderer",
     "src/verify",
 ];
 
