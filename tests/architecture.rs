@@ -39,7 +39,6 @@ const LAYERS: &[&[&str]] = &[
 const TIED: &[&str] = &[
     "src/bench",
     "src/integrators",
-    "src/output",
     "src/realtime",
     "src/verify",
 ];
