@@ -2,6 +2,9 @@
 //!
 //! ARCHITECTURE.md draws the same layers under "Layers". `cargo test --test architecture -- --nocapture` prints which rooms each room uses.
 
+#[path = "architecture/circles.rs"]
+mod circles;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -31,6 +34,12 @@ const LAYERS: &[&[&str]] = &[
     &["bench", "compare", "stress", "verify", "viewer"],
     &["cli"],
 ];
+
+/// Rooms and folders whose files are still in larger circles than `MAX_CIRCLE`.
+const TIED: &[&str] = &["src/bench", "src/realtime"];
+
+/// No circle of files has more of them than this.
+const MAX_CIRCLE: usize = 4;
 
 /// No folder holds this share of all lines.
 const MAX_SHARE: f64 = 0.15;
@@ -291,6 +300,33 @@ fn folders_have_no_circles() {
         }
     }
     assert!(circles.is_empty(), "folders in circles, or above one:\n{circles}");
+}
+
+/// Prints all circles, which `scripts/house.py` counts.
+#[test]
+fn circles_of_files_are_small() {
+    // lib.rs re-exports, main.rs is another crate
+    let files = files("src", &["rs"]).into_iter().filter(|f| !f.ends_with("src/main.rs"));
+    let mut all = circles::Crate::default();
+    let mut names = BTreeMap::new();
+    for file in files {
+        let module = module_of(&file);
+        all.add(&module, &std::fs::read_to_string(&file).unwrap()).unwrap();
+        names.insert(module, file.strip_prefix(root()).unwrap().display().to_string());
+    }
+    let (mut wrong, circles) = (String::new(), all.circles());
+    let large = circles.iter().filter(|c| c.files.len() > MAX_CIRCLE).count();
+    println!("circles of files: {}, of more than {MAX_CIRCLE}: {large}", circles.len());
+    for circle in circles {
+        let files: Vec<&str> = circle.files.iter().map(|f| names[f].as_str()).collect();
+        println!("circle of {} files: {}", files.len(), files.join(" "));
+        let is_tied = |f: &&str| TIED.iter().any(|t| f.starts_with(t));
+        if files.len() > MAX_CIRCLE && !files.iter().all(is_tied) {
+            wrong += &format!("\n{} files:\n", files.len());
+            circle.ties.iter().for_each(|(from, to, names)| wrong += &format!("  {from} uses {to} ({names})\n"));
+        }
+    }
+    assert!(wrong.is_empty(), "circles of more than {MAX_CIRCLE} files:\n{wrong}");
 }
 
 #[test]

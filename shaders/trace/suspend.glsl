@@ -7,7 +7,7 @@
 #include "trace/spread.glsl"
 #include "trace/stack.glsl"
 
-// The iteration in which a ray is suspended (`suspend_iteration` in src/tracer/compute.rs). Loops of alpha tests count, too.
+// The iteration in which a ray is suspended (`resumptions` in src/tracer/lane_budget.rs). Loops of alpha tests count, too.
 const uint SUSPEND_ITERATION = 2u * MAX_ITERATIONS - (MAX_ITERATIONS >> 3);
 
 const uint SUSPENDED_STRIDE = SUSPENDED_WORDS + 2u * (STACK_IN_REGISTERS + STACK_SIZE + 1u);

@@ -30,7 +30,7 @@ layout(local_size_x = LANES) in;
 // iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/traversal.md).
 const uint REFILL_INTERVAL = 4u;
 
-// On CPUs, where a lane has many rays (lane_budget in src/tracer/compute.rs), the first subgroup of a work-group traces all of its rays, and counts them in a register. A counter
+// On CPUs, where a lane has many rays (lane_budget in src/tracer/lane_budget.rs), the first subgroup of a work-group traces all of its rays, and counts them in a register. A counter
 // in memory is changed lane by lane, and the other subgroups, which run after the first, would find nothing left.
 bool traces_in_subgroup() {
 #ifdef BALLOT

@@ -219,6 +219,11 @@ impl<'a> FlatScene<'a> {
         }
     }
 
+    /// The index of the group that consists of this mesh alone, if it was not baked into a larger one.
+    pub fn group_of_mesh(&self, mesh: usize) -> Option<usize> {
+        self.groups.iter().position(|g| matches!(g.submeshes.as_slice(), [p] if p.mesh == mesh))
+    }
+
     /// The submesh that contains a group's primitive.
     pub fn submesh_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
         &group.submeshes[group.submeshes.partition_point(|p| p.first_primitive <= primitive) - 1]

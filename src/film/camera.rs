@@ -76,7 +76,7 @@ impl CameraRecord {
             Projection::Orthographic { half_height } => (half_height, true),
         };
         Self {
-            camera_to_world: crate::tracer::gpu_scene::rows(&relative),
+            camera_to_world: crate::tracer::transform::rows(&relative),
             view: [(half * aspect) as f32, half as f32],
             orthographic,
             clip: [camera.clip.near as f32, camera.clip.far as f32],

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::device::Device;
-use super::image::{DEPTH, IDS};
+use super::formats::{DEPTH, IDS};
 use super::pipeline::{CompileTimer, Module, Specialization, layout};
 use super::result::Context;
 use crate::error::Result;

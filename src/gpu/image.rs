@@ -7,13 +7,9 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::Device;
+use super::formats::{DEPTH, IDS};
 use super::result::Context;
 use crate::error::{Error, Result};
-
-/// Two unsigned integers per pixel.
-pub(super) const IDS: vk::Format = vk::Format::R32G32_UINT;
-/// A float per pixel.
-pub(super) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
 /// A two-dimensional image in device memory.
 pub struct Image {

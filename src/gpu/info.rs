@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use ash::{khr, vk};
 
 use super::faults;
-use super::image::{DEPTH, IDS};
+use super::formats::{DEPTH, IDS};
 use super::instance::Instance;
 use super::result::Context;
 use crate::error::{Error, Result};

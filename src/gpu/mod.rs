@@ -10,6 +10,7 @@ mod drawing;
 pub mod environment;
 #[cfg_attr(not(feature = "probes"), path = "no_faults.rs")]
 mod faults;
+mod formats;
 mod graphics_pipeline;
 pub mod host_memory;
 mod image;

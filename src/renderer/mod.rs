@@ -32,6 +32,7 @@ pub mod interactive;
 mod laps;
 pub mod report;
 pub mod settings;
+mod shell;
 pub mod still;
 pub mod still_sequence;
 pub mod survey;

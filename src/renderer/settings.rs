@@ -4,7 +4,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-pub use super::interactive::view::quoted;
+pub use super::shell::quoted;
 use super::survey::Survey;
 use super::survey::framing::{self, ChosenCamera, ViewName};
 use crate::denoise::DenoiseChoice;

@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
-use super::compute::{Hierarchy, record, unfinished_counter, write_records};
+use super::hierarchy::{Hierarchy, record, unfinished_counter};
 use super::kernel::Kernel;
+use super::upload::write_records;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;

@@ -10,8 +10,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::compute::transformed_bounds;
-use super::gpu_scene::rows;
+use super::transform::{rows, transformed_bounds};
 use super::{Structure, Tracer};
 use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
@@ -110,7 +109,7 @@ impl Dynamic {
             flat.instances.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
         let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
             let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
-            let group = group_of(flat, mesh);
+            let group = flat.group_of_mesh(mesh);
             Some((mesh, DeformingMesh { group, positions: t.positions.clone(), normals: t.normals.len() }))
         });
         Some(Self {
@@ -177,11 +176,6 @@ fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
             .reduce(|| Aabb::EMPTY, |a, b| a.union(b))
     };
     group.submeshes.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
-}
-
-/// The index of the group that consists of this mesh alone, if it was not baked into a larger one.
-pub(super) fn group_of(flat: &FlatScene, mesh: usize) -> Option<usize> {
-    flat.groups.iter().position(|g| matches!(g.submeshes.as_slice(), [p] if p.mesh == mesh))
 }
 
 impl Dynamic {

@@ -11,9 +11,8 @@ use std::time::Instant;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::compute::{instance_padding, padding, reach_padding, transformed_bounds};
-use super::dynamic::group_of;
-use super::gpu_scene::rows;
+use super::boxes::{padding, reach_padding};
+use super::transform::{instance_padding, rows, transformed_bounds};
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::{FlatScene, TlasInstance};
@@ -92,7 +91,7 @@ fn spare_capacity(blocks: usize) -> usize {
 
 fn may_deform(flat: &FlatScene) -> Vec<bool> {
     let mut out = vec![false; flat.groups.len()];
-    for group in flat.motion.meshes.iter().filter_map(|&m| group_of(flat, m)) {
+    for group in flat.motion.meshes.iter().filter_map(|&m| flat.group_of_mesh(m)) {
         out[group] = true;
     }
     out

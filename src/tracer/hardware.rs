@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
-use super::dynamic::group_of;
-use super::gpu_scene::{GpuScene, GroupBuffers, rows};
+use super::gpu_scene::GpuScene;
+use super::group_buffers::GroupBuffers;
+use super::transform::rows;
 use crate::accel::RefitPolicy;
 use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::error::{Error, Result};
@@ -62,7 +63,7 @@ impl Structures {
         let mut commands = Commands::new(device)?;
         let mut bottom = Vec::with_capacity(flat.groups.len());
         let mut deforming: Vec<Option<Deforming>> = flat.groups.iter().map(|_| None).collect();
-        for k in flat.motion.meshes.iter().filter_map(|&mesh| group_of(flat, mesh)) {
+        for k in flat.motion.meshes.iter().filter_map(|&mesh| flat.group_of_mesh(mesh)) {
             let group = &flat.groups[k];
             deforming[k] = Some(Deforming {
                 vertex_count: group.vertex_count as u32,

@@ -6,16 +6,22 @@
 //! a software BVH (`compute`) or those of VK_KHR_acceleration_structure (`hardware`).
 
 mod albedo;
+mod attributes;
+mod boxes;
 mod brute;
 mod compute;
 mod dynamic;
 mod dynamic_trees;
 pub mod entry_points;
 pub mod gpu_scene;
+mod group_buffers;
 mod hardware;
+mod hierarchy;
 mod kernel;
 mod kind;
+mod lane_budget;
 mod mipmap;
+mod needs;
 mod precompiled;
 mod previous_frame;
 pub mod queue;
@@ -24,6 +30,9 @@ mod reference;
 pub mod settings;
 pub(crate) mod shading;
 pub mod stream;
+mod textures;
+pub mod transform;
+mod upload;
 pub mod visits;
 mod wide;
 
@@ -31,9 +40,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
-pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
+pub use needs::Needs;
 pub use raster_instance::RasterInstance;
 pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
@@ -46,6 +55,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::shaders::{self, ComputeShader, Mode, StreamShaders};
 use gpu_scene::GpuScene;
+use hierarchy::Hierarchy;
+use lane_budget::lane_budget;
 use precompiled::{PipelineSpec, PrecompiledPipelines};
 
 /// Time and memory that building a tracer took.
@@ -79,7 +90,7 @@ impl BuildStats {
 }
 
 enum Structure {
-    Compute(Box<compute::Hierarchy>),
+    Compute(Box<Hierarchy>),
     /// The scene root holds the address of its top level.
     Hardware {
         levels: Box<hardware::Structures>,
@@ -314,7 +325,7 @@ impl Tracer {
                     (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
                 let s = precompiled::specialization(info, self.features, options, h.stack_constant());
                 let all = s.clone().and(constants);
-                let (rays_per_lane, _) = compute::lane_budget(info);
+                let (rays_per_lane, _) = lane_budget(info);
                 match h.kernel {
                     Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &all, rays_per_lane),
                     Kernel::Brute => Stream::brute(&self.device, shaders, &all),

@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::compute::{self, lane_budget};
 use super::kernel::{ComputeOptions, Kernel, TriangleTest};
+use super::lane_budget::{USUAL_STACK, lane_budget};
 use super::stream;
 use crate::accel::features::SceneFeatures;
 use crate::error::Result;
@@ -45,7 +45,7 @@ impl PrecompiledPipelines {
         if !fast || primitives < MIN_PRIMITIVES {
             return Vec::new();
         }
-        let s = specialization(info, features, options, compute::USUAL_STACK);
+        let s = specialization(info, features, options, USUAL_STACK);
         let mut out: Vec<PipelineSpec> = Vec::new();
         for shaders in streams {
             let spec = large(info, options.kernel, shaders, &s);

@@ -3,8 +3,7 @@
 
 use std::sync::Arc;
 
-use super::dynamic::group_of;
-use super::gpu_scene::rows;
+use super::transform::rows;
 use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
@@ -28,7 +27,7 @@ impl PreviousFrame {
             return Ok(None);
         }
         let mut previous: Vec<Option<Buffer>> = flat.groups.iter().map(|_| None).collect();
-        let deforming: Vec<usize> = flat.motion.meshes.iter().filter_map(|&m| group_of(flat, m)).collect();
+        let deforming: Vec<usize> = flat.motion.meshes.iter().filter_map(|&m| flat.group_of_mesh(m)).collect();
         for &group in &deforming {
             previous[group] = Some(Buffer::new(device, "previous vertices", positions(group), Memory::Device)?);
         }

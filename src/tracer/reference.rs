@@ -3,9 +3,10 @@
 
 use std::sync::Arc;
 
-use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, record, unfinished_counter, write_records};
-use super::kernel::BuildOptions;
-use super::kernel::Kernel;
+use super::boxes::{instance_boxes, padding, primitive_boxes};
+use super::hierarchy::{Hierarchy, record, unfinished_counter};
+use super::kernel::{BuildOptions, Kernel};
+use super::upload::write_records;
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::FlatScene;
 use crate::accel::{Aabb, Bvh2, bvh2};

@@ -1,6 +1,6 @@
 //! Materials for the path tracer: their [`ShadingRecord`], and the shader features that the scene requires.
 
-use super::gpu_scene::Needs;
+use super::needs::Needs;
 use crate::accel::flatten::FlatScene;
 use crate::interface::records::scene::TextureUse;
 use crate::interface::records::shading::ShadingRecord;
@@ -50,32 +50,53 @@ fn parameters(m: &Material) -> [f32; 2] {
     }
 }
 
-/// The textures that the path tracer uses.
+/// The textures that the path tracer uses, in the order of [`TextureFeature`].
 pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] {
     if !needs.shading || needs.white {
         return [None; SLOTS];
     }
-    [
-        m.metallic_roughness_texture,
-        m.emissive_texture,
-        m.normal_texture,
-        m.clearcoat.texture,
-        m.clearcoat.roughness_texture,
-        m.clearcoat.normal_texture,
-        m.sheen.color_texture,
-        m.sheen.roughness_texture,
-        m.transmission.texture,
-        m.specular.texture,
-        m.specular.color_texture,
-        m.anisotropy.texture,
-        m.occlusion_texture.filter(|_| needs.baked_occlusion),
-    ]
+    std::array::from_fn(|k| match TextureFeature::ALL[k] {
+        TextureFeature::Occlusion if !needs.baked_occlusion => None,
+        feature => feature.slot(m),
+    })
 }
 
-/// The encoding of the texture in a slot, as shaders/path/shading.glsl reads it.
-pub(super) fn texels(slot: usize) -> Texels {
-    // emission, colours of sheen and of specular reflection
-    if [1, 6, 10].contains(&slot) { Texels::Srgb } else { Texels::Linear }
+impl TextureFeature {
+    /// The encoding of the texture, as shaders/path/shading.glsl reads it.
+    pub(super) fn texels(self) -> Texels {
+        match self {
+            Self::Emission | Self::SheenColor | Self::SpecularColor => Texels::Srgb,
+            Self::MetallicRoughness
+            | Self::Normal
+            | Self::Clearcoat
+            | Self::ClearcoatRoughness
+            | Self::ClearcoatNormal
+            | Self::SheenRoughness
+            | Self::Transmission
+            | Self::Specular
+            | Self::Anisotropy
+            | Self::Occlusion => Texels::Linear,
+        }
+    }
+
+    /// The texture that a material has of this kind.
+    fn slot(self, m: &Material) -> Option<TextureSlot> {
+        match self {
+            Self::MetallicRoughness => m.metallic_roughness_texture,
+            Self::Emission => m.emissive_texture,
+            Self::Normal => m.normal_texture,
+            Self::Clearcoat => m.clearcoat.texture,
+            Self::ClearcoatRoughness => m.clearcoat.roughness_texture,
+            Self::ClearcoatNormal => m.clearcoat.normal_texture,
+            Self::SheenColor => m.sheen.color_texture,
+            Self::SheenRoughness => m.sheen.roughness_texture,
+            Self::Transmission => m.transmission.texture,
+            Self::Specular => m.specular.texture,
+            Self::SpecularColor => m.specular.color_texture,
+            Self::Anisotropy => m.anisotropy.texture,
+            Self::Occlusion => m.occlusion_texture,
+        }
+    }
 }
 
 /// Whether and how the material transmits light: not at all, through a thin wall, or into a volume.

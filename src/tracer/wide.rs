@@ -9,13 +9,13 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::compute::{
-    Hierarchy, instance_boxes, padding, primitive_boxes, resumptions, stack_constant, unfinished_counter, write_records,
-};
+use super::boxes::{instance_boxes, padding, primitive_boxes};
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
-use super::kernel::BuildOptions;
-use super::kernel::Kernel;
+use super::hierarchy::{Hierarchy, unfinished_counter};
+use super::kernel::{BuildOptions, Kernel};
+use super::lane_budget::{resumptions, stack_constant};
 use super::stream::{LaunchMemory, SuspendedRays, launch_rays, with_uncovered};
+use super::upload::write_records;
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::{Entries, KeyBuilder};
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};

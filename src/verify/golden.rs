@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::manifest::{Frame, GoldenFormat};
-use super::plural;
+use super::text::plural;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
 use crate::integrators::IntegratorName;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::golden::shown_image;
 use super::manifest::{Frame, GoldenFormat};
-use super::{FrameResult, Outcome, Summary, plural};
+use super::text::plural;
+use super::{FrameResult, Outcome, Summary};
 use crate::error::Result;
 use crate::measure::comparison::{CompareOptions, compare};
 use crate::output::{Image, Samples};

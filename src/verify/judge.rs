@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::golden::{Golden, shown_image};
 use super::manifest::{Frame, GoldenFormat};
-use super::plural;
+use super::text::plural;
 use super::tolerance::{FlipLimit, ZTestLimit};
 use crate::colour::srgb_decode;
 use crate::error::Result;

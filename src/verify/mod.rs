@@ -11,6 +11,7 @@ pub mod junit;
 pub mod manifest;
 pub mod selection;
 pub mod session;
+mod text;
 pub mod tolerance;
 
 use std::collections::BTreeSet;
@@ -22,6 +23,7 @@ use judge::Judgement;
 use manifest::{Frame, Manifest, Tracers};
 use selection::Selection;
 use session::Session;
+pub use text::plural;
 
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
@@ -169,11 +171,6 @@ impl Summary {
         }
         Ok(())
     }
-}
-
-/// `1 frame`, `2 frames`.
-pub fn plural(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// Does what the options say with the frames of a manifest.

@@ -9,10 +9,13 @@ use std::time::{Duration, Instant};
 
 use super::browse::Browsing;
 use super::camera::CameraControl;
+use super::dialog::{Dialog, RenderedMotion};
+use super::file_kind::FileKind;
 use super::layer::Layer;
+use super::options::{CPU_FRAME_RATE, ViewOptions};
 use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
+use super::rounding::round_length;
 use super::technique::Technique;
-use super::{FileKind, ViewOptions, panels};
 use crate::error::{Error, Result};
 use crate::integrators::IntegratorName;
 use crate::integrators::lighting::LightingSettings;
@@ -72,45 +75,6 @@ pub struct PaneState {
     pub error: Option<String>,
     /// Why it is black, if it is.
     pub black: Option<String>,
-}
-
-/// A window that asks for something.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Dialog {
-    /// For a scene: a file or `builtin:NAME`.
-    Open(String),
-    /// For the name of an image file.
-    Save(String),
-    /// For a file of settings to read.
-    LoadSettings(String),
-    /// For a file of settings to write.
-    SaveSettings(String),
-    /// For the output of `skylit render`.
-    Render(String, RenderedMotion),
-}
-
-/// What moves in the frames of `skylit render`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RenderedMotion {
-    /// Nothing: one image of the moment that is shown.
-    Nothing,
-    /// The camera, around the moment that is shown.
-    Turntable,
-    /// The animation.
-    Animation,
-}
-
-impl Dialog {
-    /// What is typed into it.
-    pub fn text_mut(&mut self) -> &mut String {
-        match self {
-            Self::Open(text)
-            | Self::Save(text)
-            | Self::LoadSettings(text)
-            | Self::SaveSettings(text)
-            | Self::Render(text, _) => text,
-        }
-    }
 }
 
 /// Playback of an animation.
@@ -292,7 +256,7 @@ impl App {
             first_animation: None,
             copied: None,
             closes: false,
-            default_frame_rate: options.frame_rate.unwrap_or(super::CPU_FRAME_RATE),
+            default_frame_rate: options.frame_rate.unwrap_or(CPU_FRAME_RATE),
             tasks: Vec::new(),
             size: [0; 2],
             layers: Vec::new(),
@@ -368,6 +332,17 @@ impl App {
         }
     }
 
+    /// Opens the last scene among files that were dropped on the window, and takes over the last environment and the last settings.
+    pub fn open_dropped(&mut self, files: &[egui::DroppedFile]) {
+        let paths: Vec<String> =
+            files.iter().filter_map(|f| f.path.as_ref()).map(|p| p.to_string_lossy().into_owned()).collect();
+        for kind in [FileKind::Scene, FileKind::Environment, FileKind::Settings] {
+            if let Some(path) = paths.iter().rev().find(|path| FileKind::of(path) == kind) {
+                self.open_file(path);
+            }
+        }
+    }
+
     /// Opens a scene.
     pub fn open(&mut self, source: &str) {
         self.last_load += 1;
@@ -420,14 +395,17 @@ impl App {
         self.messages.front().filter(|m| m.0.elapsed() < MESSAGE_TIME)
     }
 
-    /// A frame of the user interface, and what it requests of the renderer.
-    pub fn frame(&mut self, context: &egui::Context) {
+    /// Takes over what has happened since the last frame, before a frame of the user interface.
+    pub fn begin_frame(&mut self, context: &egui::Context) {
         self.receive(context);
         self.watch_files(context);
         self.watch_renders(context);
         self.advance(context);
         self.layers.clear();
-        panels::show(self, context);
+    }
+
+    /// Requests of the renderer what a frame of the user interface has changed.
+    pub fn end_frame(&mut self, context: &egui::Context) {
         if let Some(text) = self.copied.take() {
             context.copy_text(text);
         }
@@ -483,7 +461,7 @@ impl App {
                         let ao = &mut self.settings.integrators.ao;
                         let radius = match ao.ao_radius {
                             Some(Length::Units(units)) => Some(units),
-                            Some(share @ Length::OfDiagonal(_)) => share.units(control.scene_size()).map(panels::round),
+                            Some(share @ Length::OfDiagonal(_)) => share.units(control.scene_size()).map(round_length),
                             // in a closed room every ray hits something: without a radius it would be black
                             chosen => openness.and_then(|o| o.limit(chosen.is_some())),
                         };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::task::Poll;
 
-use super::app::Dialog;
+use super::dialog::Dialog;
 
 /// The system's dialog while it is open. It runs on a thread of its own, so that the window stays alive.
 pub struct Browsing {

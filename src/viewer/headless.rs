@@ -12,7 +12,7 @@ use super::layer::{BACKGROUND, FrameBuffer};
 use super::painter::{CpuPainter, Painted};
 use super::request::{EventSender, Mailbox};
 use super::script::{Script, Section};
-use super::{ViewOptions, worker};
+use super::{ViewOptions, panels, worker};
 use crate::error::Result;
 use crate::output::png;
 
@@ -64,8 +64,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
             std::thread::sleep(FRAME);
             continue;
         }
-        super::drop_files(app, &input.dropped_files);
-        let mut output = context.run(input, |context| app.frame(context));
+        app.open_dropped(&input.dropped_files);
+        let mut output = context.run(input, |context| panels::show_frame(app, context));
         painted.take(&mut output);
         script.observe(&output, app);
         let pixels = size.map(|n| n as usize);

@@ -7,12 +7,13 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
 use skylit::settings::Length;
-use skylit::viewer::app::{App, Arrangement, RenderedMotion, Second};
+use skylit::viewer::app::{App, Arrangement, Second};
+use skylit::viewer::dialog::RenderedMotion;
 use skylit::viewer::request::{
     Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, TRUTH, Task,
 };
 use skylit::viewer::technique::Technique;
-use skylit::viewer::{FileKind, ViewOptions};
+use skylit::viewer::{FileKind, ViewOptions, panels};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -39,8 +40,9 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
         device_name: None,
     };
     let app = App::new(&options, mailbox.clone(), events);
-    let harness =
-        Harness::builder().with_size(egui::vec2(1000.0, 700.0)).build_state(|context, app: &mut App| app.frame(context), app);
+    let harness = Harness::builder()
+        .with_size(egui::vec2(1000.0, 700.0))
+        .build_state(|context, app: &mut App| panels::show_frame(app, context), app);
     Alone { harness, mailbox, events: EventSender::new(sender, Arc::new(|| {})) }
 }
 

@@ -126,7 +126,7 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     }
     for entry in &flat.instances {
         words(&[entry.group as u32])?;
-        for row in crate::tracer::gpu_scene::rows(&entry.to_world) {
+        for row in crate::tracer::transform::rows(&entry.to_world) {
             words(&row.map(f32::to_bits))?;
         }
     }

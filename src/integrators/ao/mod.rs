@@ -5,16 +5,16 @@
 //! nothing more, neighbouring occlusion rays belong to one pixel, and sums do not depend on launch sizes.
 
 mod attenuation;
-use crate::settings::{Capability, choices};
+mod hemisphere;
 mod rays;
 mod report;
 pub mod settings;
 
-use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
 
 pub use attenuation::Attenuation;
+pub use hemisphere::Hemisphere;
 pub use rays::AoRays;
 
 use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
@@ -31,21 +31,13 @@ use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
+use crate::settings::Capability;
+use crate::shaders::{self, StreamShaders};
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Needs, Push, Tracer};
 
 /// Value of a sample whose camera ray missed; ambient visibility is never negative.
 const NO_HIT: f32 = -1.0;
-
-choices! {
-    /// The axis of the hemisphere that occlusion rays fill.
-    pub enum Hemisphere {
-        /// Geometric normal, on the viewer's side (as pbrt-v4's AOIntegrator)
-        Geometric = "geometric",
-        /// Shading normal (interpolated)
-        Shading = "shading",
-    }
-}
 
 /// Options of an ambient occlusion image.
 #[derive(Clone, Debug)]

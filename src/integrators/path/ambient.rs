@@ -5,6 +5,7 @@
 
 use glam::Vec3;
 
+pub use super::ambient_light::{Ambient, EnvironmentLight, OccludedLight};
 use super::{AMBIENT_COUNT, FirstSurfaceRays, PathEstimator, PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
@@ -13,94 +14,10 @@ use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_
 use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Commands, Timing};
-use crate::integrators::IntegratorSettings;
-use crate::integrators::ao::{Attenuation, Hemisphere};
-use crate::settings::choices;
+use crate::integrators::ao::Attenuation;
 use crate::shaders;
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
-
-choices! {
-    /// How the environment lights surfaces.
-    pub enum EnvironmentLight {
-        /// As a light: shadow rays find what of it a surface sees
-        Traced = "traced",
-        /// As part of the ambient light; it is visible behind the scene only
-        Ambient = "ambient",
-    }
-}
-
-choices! {
-    /// Which light ambient occlusion darkens.
-    pub enum OccludedLight {
-        /// Ambient light: what is physically meant
-        Ambient = "ambient",
-        /// All light of a surface, direct light too: shading times (1 - AO), as Larsen (2019) has it
-        All = "all",
-    }
-}
-
-/// Ambient light, and what keeps it from surfaces.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ambient {
-    /// Radiance, linear RGB.
-    pub color: Vec3,
-    /// Radius and falloff of ambient occlusion.
-    pub attenuation: Attenuation,
-    /// Axis of the hemisphere of occlusion rays.
-    pub hemisphere: Hemisphere,
-    /// Which light ambient occlusion darkens.
-    pub occluded: OccludedLight,
-}
-
-impl Ambient {
-    /// As settings say.
-    pub(super) fn new(settings: &IntegratorSettings) -> Self {
-        let ao = &settings.ao;
-        Self {
-            color: settings.path.ambient.map_or(Vec3::ONE, |c| c.as_vec3()),
-            attenuation: Attenuation { radius: ao.radius(), falloff: ao.ao_falloff.unwrap_or(1.0) },
-            hemisphere: ao.hemisphere(),
-            occluded: settings.path.occluded_light.unwrap_or_default(),
-        }
-    }
-
-    /// The parameters of occlusion rays.
-    pub(super) fn block_params(&self) -> BlockParams {
-        BlockParams {
-            hemisphere: (self.hemisphere == Hemisphere::Shading) as u32,
-            falloff_log2: self.attenuation.falloff_log2() as f32,
-            radius: self.attenuation.reach() as f32,
-            ..Default::default()
-        }
-    }
-}
-
-impl std::fmt::Display for Ambient {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let Attenuation { radius, falloff } = self.attenuation;
-        let [r, g, b] = self.color.to_array();
-        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {} normal", self.hemisphere)?;
-        match self.occluded {
-            OccludedLight::Ambient => Ok(()),
-            OccludedLight::All => f.write_str(", of all light"),
-        }
-    }
-}
-
-impl serde::Serialize for Ambient {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let Attenuation { radius, falloff } = self.attenuation;
-        serde_json::json!({
-            "color": self.color.to_array(),
-            "radius": radius.is_finite().then_some(radius),
-            "falloff": falloff,
-            "occluded_light": self.occluded,
-            "normal": self.hemisphere,
-        })
-        .serialize(serializer)
-    }
-}
 
 /// A sample of a pixel, as far as ambient light is concerned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]

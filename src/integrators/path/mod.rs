@@ -6,6 +6,7 @@
 //! Every path writes to its own memory only, so images do not depend on the order in which rays are processed.
 
 pub mod ambient;
+mod ambient_light;
 mod environment;
 mod features;
 pub mod kinds;

@@ -26,6 +26,7 @@ use crate::renderer::frames::{
     pipeline, settling_frames,
 };
 use crate::renderer::settings::CameraSettings;
+use crate::renderer::shell::quoted;
 use crate::scene::{Camera, ClipPlanes, Projection};
 
 /// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second on two cores.
@@ -478,10 +479,4 @@ pub fn camera_placement(camera: &Camera) -> CameraSettings {
         fov_y,
         clip: Some(camera.clip).filter(|clip| *clip != ClipPlanes::NONE),
     }
-}
-
-/// A word as a POSIX shell takes it.
-pub fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }

@@ -1,7 +1,8 @@
 //! Scenes whose ambient occlusion has a closed form ([`crate::oracle::closed_form`]). Lengths are in the scene's own units,
 //! before the [`SceneTransform`].
 
-use super::{SceneTransform, shapes};
+use super::shapes;
+use super::transform::SceneTransform;
 use crate::scene::{Geometry, Scene};
 use glam::{DVec3, Vec3};
 

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
-use super::{Rng, shapes};
+use super::random::Rng;
+use super::shapes;
 use crate::scene::{Geometry, Scene};
 
 /// Half of the court's sides along x and z, metres: between the axes of the columns.

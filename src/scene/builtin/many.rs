@@ -1,6 +1,7 @@
 //! Scenes of many parts: instances, spheres, alpha-masked cards, stairs.
 
-use super::{Rng, shapes};
+use super::random::Rng;
+use super::shapes;
 use crate::scene::{AlphaMode, Filter, Geometry, Material, Scene, Sphere, Texture, TextureSlot, TriangleMesh, Wrap};
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 

@@ -4,17 +4,22 @@
 //! tests; [`shapes`] has their meshes.
 
 pub mod analytic;
+mod assemble;
 pub mod atrium;
 pub mod cornell;
 pub mod many;
 pub mod parade;
 pub mod pendulum;
+mod random;
 pub mod room;
 pub mod shapes;
 pub mod terrain;
+mod transform;
 
-use super::{Camera, Geometry, Instance, Material, Mesh, Scene};
-use glam::{DAffine3, DVec3, Vec3};
+pub use transform::SceneTransform;
+
+use super::{Geometry, Scene};
+use glam::{DAffine3, DVec3};
 
 /// Name and one-line description of a built-in scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,33 +131,6 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     Some(Box::new(make))
 }
 
-/// Transform of a test scene: scale about its own origin, then translation. It becomes part of the instances' transforms.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SceneTransform {
-    /// Uniform scale.
-    pub scale: f64,
-    /// World position of the scene's own origin.
-    pub offset: DVec3,
-}
-
-impl Default for SceneTransform {
-    fn default() -> Self {
-        Self { scale: 1.0, offset: DVec3::ZERO }
-    }
-}
-
-impl SceneTransform {
-    /// The world point of a point in the scene's own units.
-    pub fn point(&self, p: DVec3) -> DVec3 {
-        p * self.scale + self.offset
-    }
-
-    /// The transform of the scene's instances.
-    pub fn transform(&self) -> DAffine3 {
-        DAffine3::from_translation(self.offset) * DAffine3::from_scale(DVec3::splat(self.scale))
-    }
-}
-
 /// The same scene with every instance's transform applied to its vertices, rounded to `f32`: what a file without transforms
 /// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them). Nothing moves in it.
 pub fn bake(scene: &Scene) -> Scene {
@@ -175,66 +153,6 @@ pub fn bake(scene: &Scene) -> Scene {
         out.meshes.push(mesh);
     }
     out
-}
-
-impl Scene {
-    /// Adds a matte material with a linear base colour; returns its index.
-    fn add_matte(&mut self, name: &str, color: Vec3) -> usize {
-        self.add_material(Material { name: name.to_owned(), base_color: color.extend(1.0), ..Material::default() })
-    }
-
-    fn add_material(&mut self, material: Material) -> usize {
-        self.materials.push(material);
-        self.materials.len() - 1
-    }
-
-    /// Adds a mesh without placing it; returns its index.
-    fn add_mesh(&mut self, name: &str, geometry: Geometry, material: usize) -> usize {
-        self.meshes.push(Mesh { name: name.to_owned(), geometry, material });
-        self.meshes.len() - 1
-    }
-
-    fn add_instance(&mut self, name: &str, mesh: usize, object_to_world: DAffine3) {
-        self.instances.push(Instance { name: name.to_owned(), mesh, object_to_world });
-    }
-
-    /// Adds a mesh and places it once.
-    fn add_object(&mut self, name: &str, geometry: Geometry, material: usize, object_to_world: DAffine3) {
-        let mesh = self.add_mesh(name, geometry, material);
-        self.add_instance(name, mesh, object_to_world);
-    }
-
-    fn add_camera(&mut self, eye: DVec3, target: DVec3, fov_y_degrees: f64) {
-        let mut camera = Camera::look_at(eye, target, DVec3::Y, fov_y_degrees.to_radians());
-        camera.name = "main".to_owned();
-        self.cameras.push(camera);
-    }
-}
-
-/// Random numbers for the layout of scenes, the same on every machine.
-struct Rng {
-    seed: u32,
-    counter: u32,
-}
-
-impl Rng {
-    fn new(seed: u32) -> Self {
-        Self { seed, counter: 0 }
-    }
-
-    /// Uniform in [lo, hi).
-    fn range(&mut self, lo: f64, hi: f64) -> f64 {
-        self.counter = self.counter.wrapping_add(1);
-        let x = crate::sampling::sobol::hash_combine(self.seed, self.counter);
-        lo + (hi - lo) * crate::sampling::to_unit(x) as f64
-    }
-
-    /// A uniformly distributed rotation (Shoemake 1992).
-    fn rotation(&mut self) -> glam::DQuat {
-        let (a, b, c) = (self.range(0.0, 1.0), self.range(0.0, std::f64::consts::TAU), self.range(0.0, std::f64::consts::TAU));
-        let (p, q) = ((1.0 - a).sqrt(), a.sqrt());
-        glam::DQuat::from_xyzw(p * b.sin(), p * b.cos(), q * c.sin(), q * c.cos()).normalize()
-    }
 }
 
 #[cfg(test)]

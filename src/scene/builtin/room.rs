@@ -3,7 +3,8 @@
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
-use super::{Rng, shapes};
+use super::random::Rng;
+use super::shapes;
 use crate::scene::{Geometry, Scene};
 
 /// Half of the room's length along x and width along z, metres.

@@ -5,7 +5,7 @@
 //! the same bits on every machine. The number of triangles decides how finely the same landscape is sampled, not what it looks
 //! like, so that rays of one camera meet the same hills at every size.
 
-use super::Rng;
+use super::random::Rng;
 use crate::sampling::sobol::hash_combine;
 use crate::scene::{Geometry, Scene, TriangleMesh};
 use glam::{DAffine3, DVec3, Vec3};

@@ -47,7 +47,7 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
 /// # Errors
 /// Those of [`load_environment`].
 pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Result<EnvironmentMap> {
-    let _in_progress = super::InProgress::begin();
+    let _in_progress = super::options::InProgress::begin();
     let budget = Budget::default();
     let Pixels { width, height, radiance, warning } =
         if path.is_dir() { cube::read(path, &budget)? } else { read(path, &budget)? };

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use super::{LoadOptions, confine, text};
+use super::options::LoadOptions;
+use super::{confine, text};
 use crate::error::{Error, Result as LoadResult};
 
 /// Number of parent folders to search above the referencing file's folder.

@@ -8,8 +8,10 @@ mod environment;
 mod find;
 mod finish;
 mod gltf;
+mod model;
 mod normals;
 mod obj;
+mod options;
 mod picture;
 mod ranges;
 mod tangents;
@@ -17,41 +19,17 @@ mod text;
 mod warnings;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
+pub use options::{ImagesDecoded, LoadOptions, is_in_progress};
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::{Scene, builtin};
-
-/// How a scene is loaded.
-#[derive(Clone, Copy)]
-pub struct LoadOptions<'a> {
-    /// Whether images are decoded. Without them materials have no textures, and [`crate::scene::LoadReport::skipped_images`] says what was left out.
-    pub textures: bool,
-    /// Called after each image that was decoded, from several threads.
-    pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
-    /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are not opened.
-    pub confine: Confine<'a>,
-}
-
-/// Images decoded so far.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ImagesDecoded {
-    /// How many.
-    pub done: usize,
-    /// Of how many; of an .obj that is not known before.
-    pub of: Option<usize>,
-}
-
-impl Default for LoadOptions<'_> {
-    fn default() -> Self {
-        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere }
-    }
-}
+use model::{check_start, extension, read_model};
+use options::{InProgress, Loading};
 
 /// Extensions of scene files.
 const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
@@ -114,37 +92,6 @@ pub fn load_file(path: &Path) -> Result<Scene> {
     load_file_with(path, &LoadOptions::default())
 }
 
-/// What all readers of a scene and its files have in common.
-#[derive(Clone, Copy)]
-struct Loading<'a> {
-    options: LoadOptions<'a>,
-    budget: &'a Budget,
-}
-
-/// Number of files that are being loaded.
-static IN_PROGRESS: AtomicUsize = AtomicUsize::new(0);
-
-/// Whether a scene or an environment is being loaded, in any thread. A load does not ask whether it is to stop: it writes nothing, and whoever wants to stop may end the process.
-pub fn is_in_progress() -> bool {
-    IN_PROGRESS.load(Ordering::Relaxed) > 0
-}
-
-/// A load, while it lasts.
-struct InProgress;
-
-impl InProgress {
-    fn begin() -> Self {
-        IN_PROGRESS.fetch_add(1, Ordering::Relaxed);
-        Self
-    }
-}
-
-impl Drop for InProgress {
-    fn drop(&mut self) {
-        IN_PROGRESS.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let _in_progress = InProgress::begin();
     let folder = options.confine.folder_for(path)?;
@@ -167,29 +114,4 @@ fn read(path: &Path, loading: Loading) -> Result<Scene> {
         "brhan" => check_start(path).and_then(|()| brhan::read(path, loading)),
         _ => read_model(path, loading),
     }
-}
-
-/// Refuses a file whose first bytes are those of something else that is often found under the name of a scene.
-fn check_start(path: &Path) -> Result<()> {
-    let start = crate::files::read_start(path)?;
-    let archive = [(&b"PK\x03\x04"[..], "a ZIP archive"), (&[0x1f, 0x8b, 0x08], "compressed with gzip")];
-    match archive.iter().find(|(signature, _)| start.starts_with(signature)) {
-        Some((_, what)) => Err(Error::input(path, format!("is {what}: unpack it first"))),
-        None => Ok(()),
-    }
-}
-
-/// Reads the formats that hold models and may be named by another file, without [`finish`].
-fn read_model(path: &Path, loading: Loading) -> Result<Scene> {
-    match extension(path).as_str() {
-        "gltf" | "glb" => check_start(path).and_then(|()| gltf::read(path, loading)),
-        "obj" => check_start(path).and_then(|()| obj::read(path, loading)),
-        "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
-        "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
-        other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),
-    }
-}
-
-fn extension(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

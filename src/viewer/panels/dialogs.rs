@@ -8,8 +8,9 @@ use egui::{Align2, Context, Key, Ui};
 
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
-use crate::viewer::app::{App, Dialog, RenderedMotion, Second};
+use crate::viewer::app::{App, Second};
 use crate::viewer::browse::Browsing;
+use crate::viewer::dialog::{Dialog, RenderedMotion};
 use crate::viewer::request::Task;
 
 /// Keys and mouse, for the help window and docs/viewer.md.

@@ -3,7 +3,8 @@
 use egui::{Button, KeyboardShortcut, Ui};
 
 use crate::scene::builtin;
-use crate::viewer::app::{App, Arrangement, Dialog, RenderedMotion};
+use crate::viewer::app::{App, Arrangement};
+use crate::viewer::dialog::{Dialog, RenderedMotion};
 use crate::viewer::request::Task;
 
 /// Keys of the commands in menus.

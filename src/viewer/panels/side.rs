@@ -2,11 +2,13 @@
 
 use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
 
-use super::{editor, performance, round};
+use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
-use crate::viewer::app::{App, RenderedMotion, Second};
+use crate::viewer::app::{App, Arrangement, Second};
+use crate::viewer::dialog::RenderedMotion;
+use crate::viewer::rounding::round_length;
 use crate::viewer::technique::{GROUPS, Technique};
 
 /// Shows all sections.
@@ -90,7 +92,7 @@ fn images(app: &mut App, ui: &mut Ui) {
             .on_hover_text("The second image is the truth of the first");
         ui.selectable_value(&mut app.second, Second::HeatMap, "Heat map")
             .on_hover_text("The second image is FLIP of the first against the truth");
-        let mut split = app.arrangement != crate::viewer::app::Arrangement::Single;
+        let mut split = app.arrangement != Arrangement::Single;
         if ui.checkbox(&mut split, "Split").on_hover_text("Both images side by side (X)").changed() {
             super::menu::toggle_split(app);
         }
@@ -120,7 +122,7 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
         );
         if check.changed() {
             // a tenth of the scene: corners are dark, rooms are not
-            ao.ao_radius = is_limited.then(|| Length::Units(round(0.1 * size)));
+            ao.ao_radius = is_limited.then(|| Length::Units(round_length(0.1 * size)));
         }
         if let (true, Some(Length::Units(radius))) = (is_limited, &mut ao.ao_radius) {
             ui.add(length(radius, size)).labelled_by(check.id);
@@ -136,7 +138,7 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
         if check.changed() {
             // corners keep their darkness, what is at the radius has lost most of its own
             let half = if ao.radius().is_finite() { 0.5 * ao.radius() } else { 0.05 * size };
-            ao.ao_falloff = falls_off.then(|| falloff_of(round(half)));
+            ao.ao_falloff = falls_off.then(|| falloff_of(round_length(half)));
         }
         if let Some(falloff) = &mut ao.ao_falloff {
             let mut half = half_distance(*falloff).min(1e3 * size);
@@ -155,7 +157,7 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
 
 /// A slider of a length in a scene of this size. A value beyond its ends stays as it is until it is dragged.
 fn length(value: &mut f64, size: f64) -> Slider<'_> {
-    let slider = Slider::new(value, round(1e-3 * size)..=round(2.0 * size)).logarithmic(true);
+    let slider = Slider::new(value, round_length(1e-3 * size)..=round_length(2.0 * size)).logarithmic(true);
     slider.clamping(SliderClamping::Edits).suffix(" units")
 }
 

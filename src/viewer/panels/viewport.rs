@@ -7,7 +7,8 @@ use egui::{
 
 use super::menu::{self, shortcuts};
 use crate::realtime::Preset;
-use crate::viewer::app::{App, Arrangement, Dialog};
+use crate::viewer::app::{App, Arrangement};
+use crate::viewer::dialog::Dialog;
 use crate::viewer::layer::Layer;
 use crate::viewer::request::{PickPurpose, Task};
 use crate::viewer::technique::Technique;

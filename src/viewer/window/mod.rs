@@ -16,7 +16,7 @@ use super::app::App;
 use super::layer::Layer;
 use super::painter::Painted;
 use super::request::{EventSender, Mailbox};
-use super::{Painter, ViewOptions, worker};
+use super::{Painter, ViewOptions, panels, worker};
 use crate::error::{Error, Result};
 
 /// Time after which it is noticed at the latest that the user has interrupted the program.
@@ -158,9 +158,9 @@ impl Viewer {
         let Some(open) = &mut self.open else { return };
         self.redraw = None;
         let input = open.input.take_egui_input(&open.window);
-        super::drop_files(&mut self.app, &input.dropped_files);
+        self.app.open_dropped(&input.dropped_files);
         let app = &mut self.app;
-        let mut output = self.context.run(input, |context| app.frame(context));
+        let mut output = self.context.run(input, |context| panels::show_frame(app, context));
         open.input.handle_platform_output(&open.window, std::mem::take(&mut output.platform_output));
         open.painted.take(&mut output);
         if let Some(viewport) = output.viewport_output.get(&egui::ViewportId::ROOT) {

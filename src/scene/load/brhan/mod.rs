@@ -14,7 +14,9 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use parse::Statement;
 
 use super::find::Finder;
-use super::{Loading, find, finish, text};
+use super::model::read_model;
+use super::options::Loading;
+use super::{find, finish, text};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
 use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
@@ -143,7 +145,7 @@ impl Loader<'_> {
         // a model that is used twice with one material is read once
         let key = (found, material.as_ref().map(|m| format!("{m:?}")));
         if !self.models.contains_key(&key) {
-            let mut model = super::read_model(&key.0, self.loading)?;
+            let mut model = read_model(&key.0, self.loading)?;
             if model.rig.is_some() {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);

@@ -1,11 +1,15 @@
 //! Typed arrays in buffers. Every range is checked against the buffer view and the buffer before a byte is read.
 
+use std::borrow::Cow;
+
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::{Index, Root, buffer};
 
-use super::container::BufferBytes;
-use super::valid;
+use super::values::valid;
 use crate::memory::Budget;
+
+/// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for whoever needs it.
+pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
 
 /// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
 pub(super) struct Reader<'a> {

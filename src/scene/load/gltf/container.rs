@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use ::gltf::json::{Buffer, Root};
 use serde_json::{Value, json};
 
+use super::accessor::BufferBytes;
 use super::node::Doubles;
 use super::uri::{self, Uri};
 use crate::error::{Error, Result};
-use crate::scene::load::{Loading, confine};
+use crate::scene::load::confine;
+use crate::scene::load::options::Loading;
 
 /// A file's JSON and, in a `.glb`, the binary chunk.
 pub(super) struct Chunks<'a> {
@@ -258,9 +260,6 @@ pub(super) fn files(document: &Root, gltf: &Path, confine: Option<&Path>) -> Res
     files.dedup();
     Ok(files)
 }
-
-/// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for whoever needs it.
-pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
 
 /// The bytes of every buffer that a buffer view refers to; others are not read.
 pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, loading: Loading) -> Vec<BufferBytes<'a>> {

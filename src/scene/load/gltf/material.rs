@@ -9,7 +9,7 @@ use glam::{Affine2, Mat2, Vec2, Vec3, Vec4};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use super::{text, valid};
+use super::values::{text, valid};
 use crate::scene::material::{AlphaMode, Anisotropy, Clearcoat, Material, Sheen, Specular, TextureSlot, Transmission};
 
 /// The extensions that the crate does not model; their names come with them.

@@ -6,7 +6,7 @@ use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::accessor::{Indices, Reader};
-use super::{AccessorIndex, valid};
+use super::values::{AccessorIndex, valid};
 use crate::scene::TriangleMesh;
 
 /// Reads a primitive; `None` for points and lines, which have no surface. `tangents` says whether the material needs them.

@@ -17,19 +17,20 @@ mod rig;
 mod skin;
 mod texture;
 mod uri;
+mod values;
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
-use ::gltf::json::accessor::Accessor;
-use ::gltf::json::validation::Checked;
-use ::gltf::json::{Index, Root};
+use ::gltf::json::Root;
 
 use accessor::Reader;
 use glam::{DAffine3, DVec3};
 use rig::{MeshVariant, RigBuilder};
+use values::text;
 
-use super::{Loading, compact};
+use super::compact;
+use super::options::Loading;
 use crate::error::{Error, Result};
 use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
 
@@ -48,21 +49,6 @@ const KNOWN: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
-
-type AccessorIndex = Index<Accessor>;
-
-/// The value, if the crate found it valid.
-fn valid<T>(checked: Checked<T>) -> Option<T> {
-    match checked {
-        Checked::Valid(value) => Some(value),
-        Checked::Invalid => None,
-    }
-}
-
-/// An optional name, or none.
-fn text(name: &Option<String>) -> &str {
-    name.as_deref().unwrap_or_default()
-}
 
 /// Reads a `.gltf` or `.glb` file.
 pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {

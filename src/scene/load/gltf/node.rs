@@ -7,7 +7,7 @@ use ::gltf::json::{Index, Node, Root};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
 
-use super::{text, valid};
+use super::values::{text, valid};
 use crate::scene::animation::LocalTransform;
 use crate::scene::camera::rigid;
 use crate::scene::{Camera, ClipPlanes, Light, LightKind, Projection};

@@ -7,7 +7,8 @@ use glam::{DAffine3, DVec3};
 
 use super::accessor::Reader;
 use super::node::{Doubles, PlacedNode};
-use super::{animation, skin, text};
+use super::values::text;
+use super::{animation, skin};
 use crate::scene::animation::{Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor};
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 

@@ -7,8 +7,8 @@ use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat4, DVec4, Vec3};
 use serde::Deserialize;
 
-use super::AccessorIndex;
 use super::accessor::Reader;
+use super::values::AccessorIndex;
 use crate::scene::animation::{self, Influences, MorphTarget};
 
 /// A skin in the file.

@@ -10,9 +10,10 @@ use ::gltf::json::{self, Index, Root};
 use rayon::prelude::*;
 
 use super::accessor::Reader;
-use super::{container, text, uri, valid};
+use super::values::{text, valid};
+use super::{container, uri};
+use crate::scene::load::options::{ImagesDecoded, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
-use crate::scene::load::{ImagesDecoded, Loading};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
 /// Decodes the images that materials use, and turns the glTF textures in their slots into the scene's.

@@ -9,7 +9,7 @@ use super::mtl::{self, MtlMaterial, unused};
 use super::texture::{Textures, is_cut_out, is_normal_map, roughness};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::load::Loading;
+use crate::scene::load::options::Loading;
 use crate::scene::load::text::{self, unquoted, without_comment};
 use crate::scene::material::{AlphaMode, Material, MaterialKind};
 use crate::scene::settings::MtlDissolve;

@@ -25,8 +25,9 @@ use keys::PositionKeys;
 use material::MaterialLibrary;
 use parse::{Group, NONE, ObjFile};
 
+use super::find;
+use super::options::Loading;
 use super::text::{self, unquoted, without_comment};
-use super::{Loading, find};
 use crate::error::Result;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh, distant_centre};
 

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use super::mtl::Map;
 use crate::error::Error;
 use crate::scene::load::find::{self, Finder};
+use crate::scene::load::options::{ImagesDecoded, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
-use crate::scene::load::{ImagesDecoded, Loading, text};
+use crate::scene::load::text;
 use crate::scene::material::TextureSlot;
 use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
 

@@ -1,0 +1,40 @@
+//! Windows that ask the user for something.
+
+/// A window that asks for something.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Dialog {
+    /// For a scene: a file or `builtin:NAME`.
+    Open(String),
+    /// For the name of an image file.
+    Save(String),
+    /// For a file of settings to read.
+    LoadSettings(String),
+    /// For a file of settings to write.
+    SaveSettings(String),
+    /// For the output of `skylit render`.
+    Render(String, RenderedMotion),
+}
+
+/// The motion in the frames of `skylit render`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderedMotion {
+    /// Nothing: one image of the moment that is shown.
+    Nothing,
+    /// The camera, around the moment that is shown.
+    Turntable,
+    /// The animation.
+    Animation,
+}
+
+impl Dialog {
+    /// The text that is typed into the window.
+    pub fn text_mut(&mut self) -> &mut String {
+        match self {
+            Self::Open(text)
+            | Self::Save(text)
+            | Self::LoadSettings(text)
+            | Self::SaveSettings(text)
+            | Self::Render(text, _) => text,
+        }
+    }
+}
