@@ -7,7 +7,14 @@ use super::keys::{Keys, degrees, direction, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
 
 /// The type.
-pub const TYPE: LightType = LightType { word: "led", name: "LED", gltf: None, strength: "intensity", read };
+pub const TYPE: LightType = LightType {
+    word: "led",
+    name: "LED",
+    gltf: None,
+    strength: "intensity",
+    keys: "position, direction, intensity (cd), half_angle (degrees from the axis where it is half)",
+    read,
+};
 
 fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
     let half_angle = keys.or("half_angle", 60f64.to_radians(), degrees(1.0..=89.0))? as f32;
