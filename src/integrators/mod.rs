@@ -133,6 +133,11 @@ pub trait Integrator: Sync {
     /// What it can do: by this settings know whether they apply to it.
     fn capabilities(&self) -> &'static [Capability];
 
+    /// Returns true if it can do this.
+    fn can(&self, capability: Capability) -> bool {
+        self.capabilities().contains(&capability)
+    }
+
     /// Names of the film's channels: one or three.
     fn channels(&self) -> &'static [&'static str];
 
@@ -201,7 +206,7 @@ pub trait Integrator: Sync {
         // ambient occlusion is like the light of a white sky: its noise does not depend on materials
         let grey =
             || path::PathOptions { size: job.size, pixel_filter: job.pixel_filter, white_sky: Some(1.0), ..Default::default() };
-        Ok(path.or_else(|| self.capabilities().contains(&Capability::Denoising).then(grey)))
+        Ok(path.or_else(|| self.can(Capability::Denoising).then(grey)))
     }
 }
 
@@ -230,6 +235,11 @@ impl IntegratorName {
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.0.name()
+    }
+
+    /// Returns true if the integrator can do this.
+    pub fn can(self, capability: Capability) -> bool {
+        self.0.can(capability)
     }
 
     /// The integrator.
