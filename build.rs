@@ -1,5 +1,6 @@
-//! Compiles every shader of src/shaders/registry.rs into OUT_DIR; not with the feature `live-shaders`: then the program compiles what it needs when it
-//! runs. Before, it checks that the records of src/interface lie for shaders where they lie for the program.
+//! Compiles every shader of src/shaders/registry.rs into OUT_DIR; not with the feature
+//! `live-shaders`: then the program compiles what it needs when it runs. Before, it checks that the
+//! records of src/interface lie for shaders where they lie for the program.
 
 #[path = "src/shaders/compiler.rs"]
 mod compiler;
@@ -31,16 +32,12 @@ use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{Decoration, Op};
 use source::Shader;
 
-/// Everything that is to be compiled.
+/// Lists all shaders that are to be compiled.
 fn all_shaders() -> Vec<Shader> {
-    #[allow(unused_mut, reason = "tests have more")]
-    let mut all = registry::all();
+    let all = registry::list_shaders().into_iter();
     #[cfg(feature = "probes")]
-    {
-        all.extend(probes::STREAMS.iter().flat_map(|s| s.variants()));
-        all.extend(probes::COMPUTE.iter().flat_map(|c| c.variants()));
-    }
-    all
+    let all = all.chain(probes::list_shaders());
+    all.collect()
 }
 
 /// Fails the build where a record lies elsewhere for shaders than for the program.
@@ -150,10 +147,12 @@ impl<'m> Layout<'m> {
     }
 }
 
-/// What `skylit --version` says of the build, as variables that the program reads while it is compiled: its features, and its commit.
+/// What `skylit --version` says of the build, as variables that the program reads while it is
+/// compiled: its features, and its commit.
 ///
-/// Only builds with optimization (`--release`) know their commit. To follow it, cargo has to run this program and compile everything after it again with
-/// each commit, which is right for what is installed and too slow for whoever works on skylit.
+/// Only builds with optimization (`--release`) know their commit. To follow it, cargo has to run
+/// this program and compile everything after it again with each commit, which is right for what is
+/// installed and too slow for whoever works on skylit.
 fn describe_build() {
     let features = std::env::vars().filter_map(|(name, _)| {
         let name = name.strip_prefix("CARGO_FEATURE_")?.to_lowercase().replace('_', "-");
@@ -172,7 +171,8 @@ fn describe_build() {
     println!("cargo:rustc-env=SKYLIT_BUILD_COMMIT={commit}");
 }
 
-/// The commit that is checked out, and its day; `None` without git, or if this folder is not the root of a repository.
+/// The commit that is checked out, and its day; `None` without git, or if this folder is not the
+/// root of a repository.
 fn commit() -> Option<String> {
     let git = |arguments: &[&str]| {
         let out = std::process::Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
@@ -181,7 +181,8 @@ fn commit() -> Option<String> {
     if !git(&["rev-parse", "--show-prefix"])?.is_empty() {
         return None;
     }
-    // both change with each commit and checkout; one that is missing would have cargo build anew every time
+    // both change with each commit and checkout; one that is missing would have cargo build anew
+    // every time
     for name in ["HEAD", "logs/HEAD"] {
         let path = git(&["rev-parse", "--git-path", name])?;
         if Path::new(&path).exists() {
@@ -193,7 +194,8 @@ fn commit() -> Option<String> {
 
 fn main() {
     describe_build();
-    // in the library the types of src/interface derive traits of packages that this program does without
+    // in the library the types of src/interface derive traits of packages that this program does
+    // without
     println!("cargo:rustc-cfg=library");
     for file in [
         "build.rs",

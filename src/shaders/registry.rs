@@ -188,13 +188,10 @@ pub const fn wide_kernel(mode: Mode, ballot: bool) -> Shader {
     Shader::new(Source::Kernel { mode, ballot })
 }
 
-/// All shaders of the program.
-pub fn all() -> Vec<Shader> {
-    let mut all: Vec<Shader> = STREAMS.iter().flat_map(|s| s.variants()).collect();
-    all.extend(COMPUTE.iter().flat_map(|c| c.variants()));
-    all.extend(STAGES.iter().copied());
-    for mode in [Any, Closest] {
-        all.extend([false, true].map(|ballot| wide_kernel(mode, ballot)));
-    }
-    all
+/// Lists all shaders of the program.
+pub fn list_shaders() -> Vec<Shader> {
+    let streams = STREAMS.iter().flat_map(|s| s.variants());
+    let compute = COMPUTE.iter().flat_map(|c| c.variants());
+    let kernels = [Any, Closest].into_iter().flat_map(|mode| [false, true].map(|ballot| wide_kernel(mode, ballot)));
+    streams.chain(compute).chain(STAGES.iter().map(|s| **s)).chain(kernels).collect()
 }

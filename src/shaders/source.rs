@@ -1,4 +1,5 @@
-//! Sources of shaders: a tracer's template and a pass make one text. Used by build.rs and by the program.
+//! Sources of shaders: a tracer's template and a pass make one text. Used by build.rs and by the
+//! program.
 
 use std::fmt;
 use std::path::Path;
@@ -7,10 +8,12 @@ use std::sync::OnceLock;
 /// Invocations per workgroup of a stream.
 pub const LANES: u32 = 64;
 
-/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work (shaders/trace/spread.glsl).
+/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work
+/// (shaders/trace/spread.glsl).
 pub const SPREAD: u32 = 16;
 
-/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory is prefetched.
+/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory
+/// is prefetched.
 pub const RUN: u32 = 4;
 
 /// Rays per invocation of a packet.
@@ -22,7 +25,8 @@ const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extensi
 /// Enables loads and stores of 64 bits, for devices with 64-bit integers.
 const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
 
-/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to a queue, or none.
+/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to
+/// a queue, or none.
 const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
 /// What a stream finds for its rays.
@@ -55,9 +59,11 @@ impl Mode {
 pub enum Rays {
     /// The pass generates them.
     Generated,
-    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead.
+    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility
+    /// can be rasterized instead.
     Camera,
-    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory (shaders/trace/known.glsl).
+    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory
+    /// (shaders/trace/known.glsl).
     CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,
@@ -167,11 +173,13 @@ impl Variant {
     }
 }
 
-/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of shaders/.
+/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of
+/// shaders/.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub const PROBES: &str = "tests/shaders";
 
-/// Files that shaders include and that are not in shaders/: generated ones, and with the feature `probes` those of the tests. `manifest`: the source tree.
+/// Files that shaders include and that are not in shaders/: generated ones, and with the feature
+/// `probes` those of the tests. `manifest`: the source tree.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
     if cfg!(feature = "probes") {
@@ -244,9 +252,12 @@ impl Source {
         }
     }
 
-    /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops over a thread's four pixels in common/filter.glsl rolled up in a
-    /// form that lavapipe's does not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by itself, and filters take three times as long.
-    /// So it is with the loops over neighbours of `antialias`, which takes half as long without, and of the two that reproject histories (three quarters).
+    /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops
+    /// over a thread's four pixels in common/filter.glsl rolled up in a form that lavapipe's does
+    /// not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by
+    /// itself, and filters take three times as long. So it is with the loops over neighbours of
+    /// `antialias`, which takes half as long without, and of the two that reproject histories
+    /// (three quarters).
     pub fn is_optimized(&self) -> bool {
         !matches!(
             self,
@@ -381,7 +392,8 @@ impl fmt::Debug for StreamShaders {
     }
 }
 
-/// A pass that traces no rays: a shader for devices with 64-bit integers, and one for those without.
+/// A pass that traces no rays: a shader for devices with 64-bit integers, and one for those
+/// without.
 #[derive(Debug)]
 pub struct ComputeShader {
     /// File in shaders/, without its ending.

@@ -1,7 +1,7 @@
 //! Shaders that only tests use: programs that are built with the feature `probes` have them, as tests
 //! are, and no other. `src/shaders/registry.rs` has the rest.
 
-use super::source::{ComputeShader, Mode::Any, Rays::Generated, StreamShaders};
+use super::source::{ComputeShader, Mode::Any, Rays::Generated, Shader, StreamShaders};
 
 /// BSDFs of materials, evaluated for given directions.
 pub static BSDF_PROBE_ANY: StreamShaders = StreamShaders::new("bsdf_probe", Any, Generated);
@@ -18,3 +18,9 @@ pub static SEQUENCE_PROBE: ComputeShader = ComputeShader::new("sequence_probe");
 
 /// The passes that trace no rays.
 pub const COMPUTE: &[&ComputeShader] = &[&INTEGERS_PROBE, &SEQUENCE_PROBE];
+
+/// Lists all shaders of tests.
+pub fn list_shaders() -> Vec<Shader> {
+    let streams = STREAMS.iter().flat_map(|s| s.variants());
+    streams.chain(COMPUTE.iter().flat_map(|c| c.variants())).collect()
+}
