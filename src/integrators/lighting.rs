@@ -21,17 +21,21 @@ settings! {
     /// Light besides the scene's.
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
-        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant radiance R,G,B, or `none` [default: the scene's]
+        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant
+        /// radiance R,G,B, or `none` [default: the scene's]
         ///
-        /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room, and the render prints them as options; `none` leaves it dark.
+        /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in
+        /// a closed room, and the render prints them as options; `none` leaves it dark.
         environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
-        /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
+        /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from
+        /// above
         environment_turn: Option<f64>,
             option(value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true), applies(LIT);
         /// Factor of the environment's radiance
         environment_scale: Option<f64>,
             option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
-        /// Add a light: its kind, then key=value, like "sun direction=0,-1,0 irradiance=3"; may be repeated
+        /// Add a light: its kind, then key=value, like "sun direction=0,-1,0 irradiance=3"; may be
+        /// repeated
         light: Vec<LightSpec>,
             option(value_name = "SPEC", value_parser = light_spec::parse, long_help = light_spec::help()), applies(LIT), basic;
     }

@@ -30,8 +30,8 @@ pub(super) fn declarations() -> Vec<Declaration> {
     all
 }
 
-/// Declares enumerations that are no settings: the name of the file in interface/, and for each variant
-/// its number and its name in shaders.
+/// Declares enumerations that are no settings: the name of the file in interface/, and for each
+/// variant its number and its name in shaders.
 macro_rules! enumerations {
     ($(
         $(#[doc = $doc:literal])*
@@ -95,14 +95,16 @@ enumerations! {
         Float = 2, "FORMAT_FLOAT";
     }
 
-    /// The meaning of a texture's values, which decides how mip levels average them. All levels hold linear values: a texture that is used in two ways has two
-    /// sets of levels.
+    /// The meaning of a texture's values, which decides how mip levels average them. All levels
+    /// hold linear values: a texture that is used in two ways has two sets of levels.
     pub enum Texels in "texels" {
-        /// Linear data. The mean of a normal map's vectors is shorter the more they differ; shaders normalize it.
+        /// Linear data. The mean of a normal map's vectors is shorter the more they differ; shaders
+        /// normalize it.
         Linear = 0, "TEXELS_LINEAR";
         /// sRGB colours, averaged as linear light.
         Srgb = 1, "TEXELS_SRGB";
-        /// sRGB colours with alpha: levels are premultiplied, so that texels of alpha 0 do not contribute.
+        /// sRGB colours with alpha: levels are premultiplied, so that texels of alpha 0 do not
+        /// contribute.
         Covered = 2, "TEXELS_COVERED";
     }
 
@@ -110,7 +112,8 @@ enumerations! {
     pub enum View in "view" {
         /// Unit shading normals, world space, on the viewer's side; normal maps included.
         Normals = 1, "VIEW_NORMALS";
-        /// Base colours, linear; for mirrors, glass and conductors the reflectance at normal incidence.
+        /// Base colours, linear; for mirrors, glass and conductors the reflectance at normal
+        /// incidence.
         Albedo = 2, "VIEW_ALBEDO";
         /// Distance along the ray, scene units.
         Depth = 3, "VIEW_DEPTH";
@@ -139,8 +142,9 @@ impl Default for Wrap {
 }
 
 choices! {
-    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and samples have equal weights (Ernst,
-    /// Stamminger, Greiner, "Filter Importance Sampling", 2006).
+    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion
+    /// to the filter, and samples have equal weights (Ernst, Stamminger, Greiner, "Filter
+    /// Importance Sampling", 2006).
     #[repr(u32)]
     pub enum PixelFilter {
         /// Box filter of one pixel
@@ -167,13 +171,17 @@ impl PixelFilter {
 }
 
 choices! {
-    /// Sampler of ray directions: a sequence of points in the unit square for each pixel, continued from frame to frame.
+    /// Sampler of ray directions: a sequence of points in the unit square for each pixel, continued
+    /// from frame to frame.
     ///
-    /// `Stratified`: sixteen consecutive samples of a pixel, over its frames, visit each cell of a 4x4 grid once. `Sobol`: each pixel has its own sequence, which
-    /// frames continue (Burley 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the samples of an aligned
-    /// square of pixels are a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
-    /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are shifted by Roberts' R2 sequence ("The
-    /// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+    /// `Stratified`: sixteen consecutive samples of a pixel, over its frames, visit each cell of a
+    /// 4x4 grid once. `Sobol`: each pixel has its own sequence, which frames continue (Burley
+    /// 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the
+    /// samples of an aligned square of pixels are a net, so that filtering it leaves little error
+    /// (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via
+    /// Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are
+    /// shifted by Roberts' R2 sequence ("The Unreasonable Effectiveness of Quasirandom Sequences",
+    /// 2018).
     #[repr(u32)]
     pub enum Sequence (default Blue) {
         /// Independent random numbers
@@ -257,7 +265,8 @@ impl ToneMap {
 }
 
 choices! {
-    /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
+    /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on
+    /// (shaders/display.glsl compares).
     #[repr(u32)]
     pub enum DisplayMode {
         /// The final image: ambient visibility, or radiance
@@ -280,11 +289,13 @@ choices! {
         Bent = "bent",
         /// A colour for each instance
         Ids = "ids",
-        /// Motion vectors since the previous frame, grey where nothing moves: more red to the right, more green downwards, 8 pixels halfway
+        /// Motion vectors since the previous frame, grey where nothing moves: more red to the
+        /// right, more green downwards, 8 pixels halfway
         Motion = "motion",
         /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
         Nodes = "nodes",
-        /// Why pixels have no history: blue was off screen, red another instance, green another depth, yellow another normal; grey has one
+        /// Why pixels have no history: blue was off screen, red another instance, green another
+        /// depth, yellow another normal; grey has one
         Rejected = "rejected",
     }
 }
@@ -311,7 +322,8 @@ impl DisplayMode {
 }
 
 impl PixelFilter {
-    /// Returns true if samples lie within their pixel, so that it sees only what projects into its area.
+    /// Returns true if samples lie within their pixel, so that it sees only what projects into its
+    /// area.
     pub fn is_within_pixel(self) -> bool {
         matches!(self, Self::Box | Self::Centre)
     }
@@ -323,8 +335,8 @@ mod tests {
 
     use super::*;
 
-    /// What shaders cannot tell apart would be found by no compiler: GLSL's constants are in files that are
-    /// included apart.
+    /// What shaders cannot tell apart would be found by no compiler: GLSL's constants are in files
+    /// that are included apart.
     #[test]
     fn names_and_numbers_tell_variants_apart() {
         let all = declarations();

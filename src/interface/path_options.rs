@@ -1,5 +1,5 @@
-//! The options of paths that are numbers in shaders, and the features that options and lights require of
-//! the shaders of paths.
+//! The options of paths that are numbers in shaders, and the features that options and lights
+//! require of the shaders of paths.
 
 use super::constants::Constant;
 use super::features::{Declaration, PATH_FIRST, feature_set};
@@ -9,7 +9,8 @@ records! {
 
     /// Options of paths, each of which the list in src/interface/path_options.rs declares.
     PathOptionsRecord: Structure {
-        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone [default: 0]
+        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene,
+        /// 2 leaves indirect light alone [default: 0]
         min_depth: uint,
         /// Bounces before Russian roulette may end a path [default: 5]
         rr_depth: uint,

@@ -32,8 +32,9 @@ static SPIRV: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/spirv.rs"))
 impl Shader {
     /// Its SPIR-V.
     ///
-    /// # Errors None, except with the feature `live-shaders`: [`crate::Error::Usage`] with the
-    /// compiler's message.
+    /// # Errors
+    /// None, except with the feature `live-shaders`: [`crate::Error::Usage`] with the compiler's
+    /// message.
     ///
     /// # Panics
     /// If no list of `registry.rs` names the shader.

@@ -1,6 +1,7 @@
-//! Settings of path tracing and of the integrators based on it: the settings as given ([`PathSettings`]), the resolved options of a render ([`PathOptions`]),
-//! the shader features that they require, and their metadata and JSON record. An option that is a number in shaders is also a field of
-//! [`PathOptionsRecord`].
+//! Settings of path tracing and of the integrators based on it: the settings as given
+//! ([`PathSettings`]), the resolved options of a render ([`PathOptions`]), the shader features that
+//! they require, and their metadata and JSON record. An option that is a number in shaders is also
+//! a field of [`PathOptionsRecord`].
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,7 +37,8 @@ const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
 /// The integrator with ambient light.
 const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
 
-/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl) ends paths long before.
+/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl)
+/// ends paths long before.
 pub const MAX_DEPTH: u32 = 4096;
 
 /// Default albedo of `ao-sky`.
@@ -45,7 +47,8 @@ const SKY_ALBEDO: f64 = 0.5;
 const SENSOR_HEIGHT: f64 = 0.024;
 
 choices! {
-    /// How directions are sampled. All strategies estimate the same image; all but the first are for comparison.
+    /// How directions are sampled. All strategies estimate the same image; all but the first are
+    /// for comparison.
     pub enum Strategy {
         /// Multiple importance sampling of BSDF and lights, power heuristic (Veach 1997)
         Mis = "mis",
@@ -89,9 +92,11 @@ settings! {
     /// Paths.
     "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
     pub struct PathSettings {
-        /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
+        /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the
+        /// scene's, or no limit]
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
-        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone [default: 0]
+        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene,
+        /// 2 leaves indirect light alone [default: 0]
         min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
         /// Bounces before Russian roulette may end a path [default: 5]
         rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
@@ -115,7 +120,8 @@ settings! {
         occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
         /// Texture filter of paths [default: bilinear]
         texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
-        /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
+        /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres
+        /// [default: a pinhole]
         f_number: Option<f64>,
             option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);
         /// Focus distance along the view, in scene units
@@ -133,13 +139,16 @@ pub struct PathOptions {
     pub spp: u32,
     /// Seed of the sampler.
     pub seed: u32,
-    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most [`MAX_DEPTH`].
+    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most
+    /// [`MAX_DEPTH`].
     pub max_depth: u32,
     /// Sampling strategy.
     pub strategy: Strategy,
-    /// Continue paths by delta lobes only, so that light sampling accounts for all other light: with [`Strategy::Light`].
+    /// Continue paths by delta lobes only, so that light sampling accounts for all other light:
+    /// with [`Strategy::Light`].
     pub specular_only: bool,
-    /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
+    /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the
+    /// rendering equation that ambient occlusion approximates.
     pub white_sky: Option<f32>,
     /// Ambient light at the first surface of each path.
     pub ambient: Option<Ambient>,
@@ -155,7 +164,8 @@ pub struct PathOptions {
     pub lens: Option<Lens>,
     /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
-    /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
+    /// Tiles of the image that show geometry; only if the environment is black and
+    /// [`PathOptions::is_sharp`].
     pub tile_mask: Option<Arc<TileMask>>,
     /// The film to resume, and when to save it.
     pub film: FilmOptions,
@@ -214,8 +224,8 @@ impl PathSettings {
 }
 
 impl PathOptions {
-    /// The options that the samples of an image depend on, each with its key, its text in an image's metadata (`None`: the key is absent), and its value in the JSON
-    /// record.
+    /// The options that the samples of an image depend on, each with its key, its text in an
+    /// image's metadata (`None`: the key is absent), and its value in the JSON record.
     fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
         // without `..`, so that a new option must be added here
         let Self {
@@ -352,7 +362,8 @@ impl PathOptions {
         Ok(options)
     }
 
-    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key is absent.
+    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key
+    /// is absent.
     pub fn identity(&self) -> Vec<(&'static str, Option<String>)> {
         self.described().into_iter().map(|(key, text, _)| (key, text)).collect()
     }
@@ -432,7 +443,8 @@ mod tests {
     use super::*;
     use crate::interface::path_options;
 
-    /// Every option that is a number in shaders is a setting, an option, and described; and shaders get its value.
+    /// Every option that is a number in shaders is a setting, an option, and described; and shaders
+    /// get its value.
     #[test]
     fn numbers_stand_in_every_table() {
         let fields = path_options::FILE.records[0].fields.iter();
@@ -459,7 +471,8 @@ mod tests {
         }
     }
 
-    /// An option that needs code of its own in shaders has it, and one that makes images biased is remarked on.
+    /// An option that needs code of its own in shaders has it, and one that makes images biased is
+    /// remarked on.
     #[test]
     fn numbers_have_their_features_and_remarks() {
         let enabled = |options: &PathOptions| -> Vec<PathFeature> {

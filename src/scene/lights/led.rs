@@ -1,5 +1,6 @@
-//! Lights at a position whose intensity is a power of the cosine of the angle from an axis, as data sheets describe LEDs and downlights: by the angle at which it
-//! is half. An angle of 60 degrees is a small Lambertian emitter; a beam angle is twice that angle.
+//! Lights at a position whose intensity is a power of the cosine of the angle from an axis, as data
+//! sheets describe LEDs and downlights: by the angle at which it is half. An angle of 60 degrees is
+//! a small Lambertian emitter; a beam angle is twice that angle.
 
 use std::f64::consts::{FRAC_PI_2, LN_2};
 

@@ -17,7 +17,8 @@ pub struct LightType {
     pub word: &'static str,
     /// Its name in inventories and messages.
     pub name: &'static str,
-    /// Its type in KHR_lights_punctual, if that has it. Renderers that are compared with have the same ones.
+    /// Its type in KHR_lights_punctual, if that has it. Renderers that are compared with have the
+    /// same ones.
     pub gltf: Option<&'static str>,
     /// Key of its strength for `--light`, which says the unit.
     pub strength: &'static str,
@@ -57,7 +58,8 @@ pub enum Emission {
     },
 }
 
-/// Type of a light. Area lights are emissive surfaces ([`Material::emissive`](crate::scene::Material::emissive)).
+/// Type of a light. Area lights are emissive surfaces
+/// ([`Material::emissive`](crate::scene::Material::emissive)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     /// `intensity` in lux, on a surface that faces the light.
@@ -74,7 +76,8 @@ pub enum LightKind {
         /// Angle from the axis at which the falloff ends, in radians.
         outer_angle: f32,
     },
-    /// `intensity` in candela along the axis; beside it falls off as a power of the cosine, to nothing at 90 degrees.
+    /// `intensity` in candela along the axis; beside it falls off as a power of the cosine, to
+    /// nothing at 90 degrees.
     Led {
         /// Angle from the axis at which the intensity is half of that, in radians, 1 to 89 degrees.
         half_angle: f32,
