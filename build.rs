@@ -1,37 +1,28 @@
-//! Compiles every shader of src/shaders/registry.rs into OUT_DIR; not with the feature `live-shaders`: then the program compiles what it needs when it
-//! runs. Before, it checks that the records of src/interface lie for shaders where they lie for the program.
-
-// what the program derives for the types of interface, build.rs has no use for
-macro_rules! shared_record {
-    ($($item:tt)*) => { $($item)* };
-}
-macro_rules! shared_enumeration {
-    ($($item:tt)*) => { $($item)* };
-}
-macro_rules! shared_choice {
-    (
-        $(#[$meta:meta])* pub enum $name:ident $((default $default:ident))? {
-            $($(#[$about:meta])+ $variant:ident = $setting:literal,)+
-        }
-    ) => {
-        $(#[$meta])*
-        #[derive(Clone, Copy)]
-        pub enum $name {
-            $($(#[$about])+ $variant,)+
-        }
-    };
-}
+//! Compiles every shader of src/shaders/registry.rs into OUT_DIR; not with the feature
+//! `live-shaders`: then the program compiles what it needs when it runs. Before, it checks that the
+//! records of src/interface lie for shaders where they lie for the program.
 
 #[path = "src/shaders/compiler.rs"]
 mod compiler;
 #[path = "src/interface/mod.rs"]
 #[allow(dead_code, unused_imports, reason = "the program uses the rest")]
 mod interface;
+#[cfg(feature = "probes")]
+#[path = "tests/shaders/registry.rs"]
+mod probes;
+#[path = "src/shaders/registry.rs"]
+mod registry;
+#[path = "src/settings"]
+mod settings {
+    mod choices;
+    pub(crate) use choices::choices;
+}
 #[path = "src/shaders/source.rs"]
 #[allow(dead_code, reason = "the program uses the rest")]
 mod source;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -39,65 +30,14 @@ use compiler::Compiler;
 use interface::layout::Reflected;
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{Decoration, Op};
-use source::{Mode, Rays, Source, Stage, Variant, mode, rays};
+use source::Shader;
 
-/// A shader that is to be compiled: its file's name in OUT_DIR, and what it is compiled from; nothing where no such shader applies.
-type Job = (String, Option<Source>);
-
-/// The two variants of a pass that traces no rays.
-fn compute_jobs(pass: &'static str) -> [Job; 2] {
-    [(false, 32), (true, 64)].map(|(int64, bits)| (format!("{pass}_{bits}.spv"), Some(Source::Compute { pass, int64 })))
-}
-
-macro_rules! debug_view_jobs {
-    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
-        [$(compute_jobs($name)),*].concat()
-    };
-}
-
-macro_rules! registry {
-    (
-        streams { $($stream:ident = $pass:literal, $mode:ident, $rays:ident;)* }
-        compute { $($compute:ident = $name:literal;)* }
-        stages { $($stage:ident = $path:literal, $kind:ident;)* }
-    ) => {
-        pub fn jobs() -> Vec<Job> {
-            let mut jobs = Vec::new();
-            $(
-                for variant in Variant::ALL {
-                    let source = Source::Stream { pass: $pass, mode: mode!($mode), variant };
-                    let file = format!("{}_{}_{variant:?}.spv", $pass, stringify!($mode));
-                    jobs.push((file, variant.applies_to(rays!($rays)).then_some(source)));
-                }
-            )*
-            $(jobs.extend(compute_jobs($name));)*
-            $(jobs.push((concat!(stringify!($stage), ".spv").to_owned(), Some(Source::File { path: $path, stage: Stage::$kind })));)*
-            jobs
-        }
-    };
-}
-
-include!("src/shaders/registry.rs");
-
-#[cfg(feature = "probes")]
-mod probes {
-    use super::*;
-
-    include!("tests/shaders/registry.rs");
-}
-
-/// Everything that is to be compiled.
-fn all_jobs() -> Vec<Job> {
-    let mut all = jobs();
-    all.extend(interface::debug_views::debug_views!(debug_view_jobs));
+/// Lists all shaders that are to be compiled.
+fn all_shaders() -> Vec<Shader> {
+    let all = registry::list_shaders().into_iter();
     #[cfg(feature = "probes")]
-    all.extend(probes::jobs());
-    for (ballot, bits) in [(false, 32), (true, 64)] {
-        for (mode, name) in [(Mode::Any, "any"), (Mode::Closest, "closest")] {
-            all.push((format!("wide_{name}_{bits}.spv"), Some(Source::Kernel { mode, ballot })));
-        }
-    }
-    all
+    let all = all.chain(probes::list_shaders());
+    all.collect()
 }
 
 /// Fails the build where a record lies elsewhere for shaders than for the program.
@@ -207,10 +147,12 @@ impl<'m> Layout<'m> {
     }
 }
 
-/// What `skylit --version` says of the build, as variables that the program reads while it is compiled: its features, and its commit.
+/// What `skylit --version` says of the build, as variables that the program reads while it is
+/// compiled: its features, and its commit.
 ///
-/// Only builds with optimization (`--release`) know their commit. To follow it, cargo has to run this program and compile everything after it again with
-/// each commit, which is right for what is installed and too slow for whoever works on skylit.
+/// Only builds with optimization (`--release`) know their commit. To follow it, cargo has to run
+/// this program and compile everything after it again with each commit, which is right for what is
+/// installed and too slow for whoever works on skylit.
 fn describe_build() {
     let features = std::env::vars().filter_map(|(name, _)| {
         let name = name.strip_prefix("CARGO_FEATURE_")?.to_lowercase().replace('_', "-");
@@ -229,7 +171,8 @@ fn describe_build() {
     println!("cargo:rustc-env=SKYLIT_BUILD_COMMIT={commit}");
 }
 
-/// The commit that is checked out, and its day; `None` without git, or if this folder is not the root of a repository.
+/// The commit that is checked out, and its day; `None` without git, or if this folder is not the
+/// root of a repository.
 fn commit() -> Option<String> {
     let git = |arguments: &[&str]| {
         let out = std::process::Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
@@ -238,7 +181,8 @@ fn commit() -> Option<String> {
     if !git(&["rev-parse", "--show-prefix"])?.is_empty() {
         return None;
     }
-    // both change with each commit and checkout; one that is missing would have cargo build anew every time
+    // both change with each commit and checkout; one that is missing would have cargo build anew
+    // every time
     for name in ["HEAD", "logs/HEAD"] {
         let path = git(&["rev-parse", "--git-path", name])?;
         if Path::new(&path).exists() {
@@ -250,7 +194,17 @@ fn commit() -> Option<String> {
 
 fn main() {
     describe_build();
-    for file in ["build.rs", "src/interface", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
+    // in the library the types of src/interface derive traits of packages that this program does
+    // without
+    println!("cargo:rustc-cfg=library");
+    for file in [
+        "build.rs",
+        "src/interface",
+        "src/settings/choices.rs",
+        "src/shaders/compiler.rs",
+        "src/shaders/source.rs",
+        "src/shaders/registry.rs",
+    ] {
         println!("cargo:rerun-if-changed={file}");
     }
     if let Err(mismatches) = check_records() {
@@ -266,10 +220,12 @@ fn main() {
     if cfg!(feature = "probes") {
         println!("cargo:rerun-if-changed={}", manifest.join(source::PROBES).display());
     }
-    let (included, mut errors) = compile(&all_jobs(), &manifest, &out);
+    let shaders = all_shaders();
+    let (included, mut errors) = compile(&shaders, &manifest, &out);
     for file in included {
         println!("cargo:rerun-if-changed={}", file.display());
     }
+    write_table(&shaders, &out);
     if !errors.is_empty() {
         errors.sort();
         fail(&errors);
@@ -284,30 +240,39 @@ fn fail(errors: &[String]) -> ! {
     std::process::exit(1);
 }
 
+/// Writes the table of SPIR-V by name that src/shaders/mod.rs includes, an expression.
+fn write_table(shaders: &[Shader], out: &Path) {
+    let names: BTreeSet<String> = shaders.iter().map(|s| s.source().file_name()).collect();
+    let mut table = "&[\n".to_owned();
+    for name in names {
+        let _ = writeln!(table, "    (\"{name}\", include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\"))),");
+    }
+    std::fs::write(out.join("spirv.rs"), table + "]\n").expect("OUT_DIR can be written");
+}
+
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.
-fn compile(jobs: &[Job], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
+fn compile(shaders: &[Shader], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let compiler = Compiler::new(&manifest.join("shaders"), source::generated_files(interface::glsl::files(), manifest), out);
-    let next = Mutex::new(jobs.iter());
+    let next = Mutex::new(shaders.iter());
     let results = Mutex::new((BTreeSet::new(), Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
                 loop {
-                    let Some((file, source)) = next.lock().expect("no compiler panics").next() else { break };
-                    let compiled = source.as_ref().map(|s| compiler.compile(s));
+                    let Some(shader) = next.lock().expect("no compiler panics").next() else { break };
+                    let compiled = compiler.compile(shader.source());
                     let mut results = results.lock().expect("no compiler panics");
-                    // what does not compile is empty, too, so that no second error follows
+                    // what does not compile is empty, so that no second error follows
                     let mut spirv = Vec::new();
                     match compiled {
-                        None => {}
-                        Some(Ok(compiled)) => {
+                        Ok(compiled) => {
                             results.0.extend(compiled.included);
                             spirv = compiled.spirv;
                         }
-                        Some(Err(error)) => results.1.push(error),
+                        Err(error) => results.1.push(error),
                     }
-                    std::fs::write(out.join(file), spirv).expect("OUT_DIR can be written");
+                    std::fs::write(out.join(shader.source().file_name() + ".spv"), spirv).expect("OUT_DIR can be written");
                 }
             });
         }

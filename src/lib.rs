@@ -8,24 +8,6 @@
 
 #![deny(unsafe_code)]
 
-// What the crate derives for the types of `interface`, which build.rs compiles, too, without these dependencies.
-macro_rules! shared_record {
-    ($($item:tt)*) => {
-        #[derive(bytemuck::Pod, bytemuck::Zeroable)]
-        $($item)*
-    };
-}
-macro_rules! shared_enumeration {
-    ($($item:tt)*) => {
-        #[derive(serde::Serialize)]
-        #[serde(rename_all = "kebab-case")]
-        $($item)*
-    };
-}
-macro_rules! shared_choice {
-    ($($item:tt)*) => { $crate::settings::choices! { $($item)* } };
-}
-
 pub mod accel;
 #[cfg(feature = "bench")]
 pub mod bench;

@@ -280,7 +280,7 @@ impl ComputeShader {
     /// # Errors
     /// Those of the device.
     pub fn specialized(&self, device: &Arc<Device>, constants: &Specialization) -> Result<ComputePipeline> {
-        ComputePipeline::new(device, self.name, self.variant(device.info.int64), constants)
+        ComputePipeline::new(device, self.name, &self.variant(device.info.int64), constants)
     }
 }
 

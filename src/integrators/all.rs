@@ -2,7 +2,7 @@
 
 use super::{Integrator, ao, path};
 use crate::error::{Error, Result};
-use crate::settings::{self, GivenSetting};
+use crate::settings::{self, Capability, GivenSetting};
 
 /// All integrators, in the order in which they are listed to users.
 pub static ALL: &[&dyn Integrator] = &[
@@ -31,6 +31,11 @@ impl IntegratorName {
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.0.name()
+    }
+
+    /// Returns true if the integrator can do this.
+    pub fn can(self, capability: Capability) -> bool {
+        self.0.can(capability)
     }
 
     /// The integrator.

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use glam::{DMat3, Vec3};
 
 use crate::error::{Error, Result};
-use crate::interface::light_types::light_types;
 #[cfg(feature = "cli")]
 use crate::scene::light_spec;
 use crate::scene::light_spec::LightSpec;
@@ -18,38 +17,29 @@ use crate::settings::{AppliesTo, Capability, settings};
 /// Integrators that lights apply to.
 const LIT: AppliesTo = AppliesTo::of(Capability::SceneLights);
 
-macro_rules! lighting_settings {
-    ($(
-        $(#[doc = $doc:literal])+
-        $variant:ident $({ $($(#[doc = $about:literal])+ $field:ident: $type:ty,)+ })? = mod $module:ident, $flag:literal, $label:literal, help($help:literal);
-    )*) => {
-        settings! {
-            /// Light besides the scene's.
-            "Light (--integrator path, direct, lit, whitted)"
-            pub struct LightingSettings {
-                /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant radiance R,G,B, or `none` [default: the scene's]
-                ///
-                /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room, and the render prints them as options; `none` leaves it dark.
-                environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
-                /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
-                environment_turn: Option<f64>,
-                    option(value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true), applies(LIT);
-                /// Factor of the environment's radiance
-                environment_scale: Option<f64>,
-                    option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
-                /// Add a light: its kind, then key=value, like "sun direction=0,-1,0 irradiance=3"; may be repeated
-                ///
-                /// Kinds and their keys.
-                $(#[doc = $help])*
-                /// sphere: position, radius, radiance; rectangle: position, direction, size=W,H, radiance; disk: position, direction, radius, radiance; portal: position,
-                /// direction, size=W,H of an opening through which the environment is sampled, which lessens the noise of rooms. Direction is that in which it emits;
-                /// color=R,G,B or temperature=K tints it.
-                light: Vec<LightSpec>, option(value_name = "SPEC", value_parser = light_spec::parse), applies(LIT), basic;
-            }
-        }
-    };
+settings! {
+    /// Light besides the scene's.
+    "Light (--integrator path, direct, lit, whitted)"
+    pub struct LightingSettings {
+        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant
+        /// radiance R,G,B, or `none` [default: the scene's]
+        ///
+        /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in
+        /// a closed room, and the render prints them as options; `none` leaves it dark.
+        environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
+        /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from
+        /// above
+        environment_turn: Option<f64>,
+            option(value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true), applies(LIT);
+        /// Factor of the environment's radiance
+        environment_scale: Option<f64>,
+            option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
+        /// Add a light: its kind, then key=value, like "sun direction=0,-1,0 irradiance=3"; may be
+        /// repeated
+        light: Vec<LightSpec>,
+            option(value_name = "SPEC", value_parser = light_spec::parse, long_help = light_spec::help()), applies(LIT), basic;
+    }
 }
-light_types!(lighting_settings);
 
 impl LightingSettings {
     /// Adds the lights to a scene, and replaces its environment if one is given.

@@ -124,6 +124,11 @@ pub trait Integrator: Sync {
     /// What it can do: by this settings know whether they apply to it.
     fn capabilities(&self) -> &'static [Capability];
 
+    /// Returns true if it can do this.
+    fn can(&self, capability: Capability) -> bool {
+        self.capabilities().contains(&capability)
+    }
+
     /// Names of the film's channels: one or three.
     fn channels(&self) -> &'static [&'static str];
 
@@ -192,7 +197,7 @@ pub trait Integrator: Sync {
         // ambient occlusion is like the light of a white sky: its noise does not depend on materials
         let grey =
             || path::PathOptions { size: job.size, pixel_filter: job.pixel_filter, white_sky: Some(1.0), ..Default::default() };
-        Ok(path.or_else(|| self.capabilities().contains(&Capability::Denoising).then(grey)))
+        Ok(path.or_else(|| self.can(Capability::Denoising).then(grey)))
     }
 }
 

@@ -2,8 +2,7 @@
 //! stored in as many 32-bit specialization constants as it needs, and a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
-use super::light_types::light_types;
-use super::path_options::path_options;
+use super::path_options::{PATH, PathFeatures};
 
 /// A set, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
@@ -19,6 +18,7 @@ pub(super) struct Declaration {
     pub features: &'static [(&'static str, &'static str)],
 }
 
+/// Declares a set and the features that it may hold, each with its name in shaders and its label.
 macro_rules! feature_set {
     (
         $(#[doc = $set_doc:literal])*
@@ -51,7 +51,7 @@ macro_rules! feature_set {
         }
 
         impl $set {
-            const WORDS: usize = $feature::ALL.len().div_ceil(32);
+            pub(super) const WORDS: usize = $feature::ALL.len().div_ceil(32);
 
             /// Is it in the set?
             pub fn contains(self, feature: $feature) -> bool {
@@ -101,10 +101,13 @@ macro_rules! feature_set {
     };
 }
 
+pub(super) use feature_set;
+
 const BSDF_FIRST: u32 = constants::ALL.len() as u32;
 const MATERIAL_FIRST: u32 = BSDF_FIRST + BsdfModels::WORDS as u32;
 const TEXTURE_FIRST: u32 = MATERIAL_FIRST + MaterialFeatures::WORDS as u32;
-const PATH_FIRST: u32 = TEXTURE_FIRST + TextureFeatures::WORDS as u32;
+/// `constant_id` of the first word of [`PathFeatures`].
+pub(super) const PATH_FIRST: u32 = TEXTURE_FIRST + TextureFeatures::WORDS as u32;
 const LIGHT_FIRST: u32 = PATH_FIRST + PathFeatures::WORDS as u32;
 
 feature_set! {
@@ -159,65 +162,21 @@ feature_set! {
     Occlusion = "USE_OCCLUSION", "occlusion";
 }
 
-macro_rules! path_features {
-    ($(
-        $(#[doc = $doc:literal])+
-        $field:ident: $type:ident as $kind:ident = $default:expr, setting($($setting:tt)*)
-        $(, feature($feature:ident = $constant:literal, $label:literal))? $(, remark($remark:literal))?;
-    )*) => {
-        feature_set! {
-            /// Features that the lights of a scene and the options of a render require of paths.
-            PathFeatures of /// A feature that lights and options may require of paths.
-            PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
-            LightTree = "WITH_LIGHT_TREE", "light tree";
-            LightGroups = "WITH_LIGHT_GROUPS", "placed and distant lights";
-            LightSplit = "WITH_LIGHT_SPLIT", "a light sample of each group at first vertices";
-            SurfaceLights = "WITH_SURFACE_LIGHTS", "surfaces that light samples find";
-            LightChoice = "WITH_LIGHT_CHOICE", "a choice among distant lights";
-            EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
-            LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
-            Mis = "WITH_MIS", "multiple importance sampling";
-            CosineSampling = "WITH_COSINE_SAMPLING", "cosine hemisphere sampling";
-            UniformSampling = "WITH_UNIFORM_SAMPLING", "uniform hemisphere sampling";
-            ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
-            View = "WITH_VIEW", "auxiliary view";
-            Lens = "WITH_LENS", "thin lens";
-            PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
-            RayCones = "WITH_RAY_CONES", "ray cones";
-            DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
-            Media = "WITH_MEDIA", "volumes that absorb or nest";
-            ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
-            SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
-            Ambient = "WITH_AMBIENT", "ambient light";
-            BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
-            OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
-            Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";
-            $($($feature = $constant, $label;)?)*
-        }
-    };
+feature_set! {
+    /// The kinds of lights that paths sample.
+    LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
+    /// what they do). What calls them is made of this list ([`super::glsl`]). The first five are of surfaces and the environment; the others are those of `src/scene/lights`. [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
+    LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
+    Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
+    Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
+    Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
+    Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
+    Portal = "HAS_PORTAL_LIGHTS", "portals";
+    Directional = "HAS_DIRECTIONAL_LIGHTS", "directional lights";
+    Point = "HAS_POINT_LIGHTS", "point lights";
+    Spot = "HAS_SPOT_LIGHTS", "spot lights";
+    Led = "HAS_LED_LIGHTS", "LEDs";
 }
-path_options!(path_features);
-
-macro_rules! light_kinds {
-    ($(
-        $(#[doc = $doc:literal])+
-        $variant:ident $({ $($(#[doc = $about:literal])+ $field:ident: $type:ty,)+ })? = mod $module:ident, $flag:literal, $label:literal, help($help:literal);
-    )*) => {
-        feature_set! {
-            /// The kinds of lights that paths sample.
-            LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
-            /// what they do). What calls them is made of this list ([`super::glsl`]). Those that no surface emits are in src/interface/light_types.rs. [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
-            LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
-            Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
-            Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
-            Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
-            Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
-            Portal = "HAS_PORTAL_LIGHTS", "portals";
-            $($variant = $flag, $label;)*
-        }
-    };
-}
-light_types!(light_kinds);
 
 /// The features of the path tracer's shaders that a scene's materials require.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -242,6 +201,7 @@ impl BsdfModel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::path_options::PathFeature;
     use super::*;
 
     #[test]

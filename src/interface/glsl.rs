@@ -11,13 +11,7 @@ pub fn files() -> Vec<(String, String)> {
     files.extend(features::SETS.iter().map(|set| file(set.name, &feature_set(set))));
     files.push(file("bsdf_dispatch", &bsdf_dispatch()));
     files.push(file("light_dispatch", &light_dispatch()));
-    files.extend(
-        enumerations::ALL
-            .iter()
-            .chain(enumerations::CHOICES)
-            .chain(enumerations::DISPLAY_MODES)
-            .map(|e| file(e.name, &enumeration(e))),
-    );
+    files.extend(enumerations::declarations().iter().map(|e| file(e.name, &enumeration(e))));
     files.extend(records::FILES.iter().map(|f| {
         let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
         let loads: String = f.records.iter().filter_map(load).collect();
@@ -151,8 +145,8 @@ fn light_dispatch() -> String {
 
 fn enumeration(e: &enumerations::Declaration) -> String {
     let mut text = String::new();
-    for (name, number, doc) in e.variants {
-        let _ = writeln!(text, "const uint {name} = {number}u;  //{doc}");
+    for (name, number, doc) in &e.variants {
+        let _ = writeln!(text, "const uint {name} = {number}u;  // {doc}");
     }
     let _ = writeln!(text, "const uint {}_COUNT = {}u;", e.name.to_uppercase(), e.variants.len());
     text

@@ -141,81 +141,46 @@ pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: 
     out
 }
 
-/// The Rust type of a GLSL type.
-macro_rules! rust_type {
-    (float) => {
-        f32
-    };
-    (int) => {
-        i32
-    };
-    (uint) => {
-        u32
-    };
-    (vec2) => {
-        [f32; 2]
-    };
-    (vec3) => {
-        [f32; 3]
-    };
-    (vec4) => {
-        [f32; 4]
-    };
-    (uvec2) => {
-        [u32; 2]
-    };
-    (uvec3) => {
-        [u32; 3]
-    };
-    (uvec4) => {
-        [u32; 4]
-    };
-    (address) => {
-        u64
-    };
-    (bytes8) => {
-        [u8; 8]
-    };
-    ($record:ident) => {
-        $record
-    };
-    ($kind:ident [$count:expr]) => {
-        [rust_type!($kind); $count]
-    };
-    ($kind:ident [$outer:expr] [$inner:expr]) => {
-        [[rust_type!($kind); $inner]; $outer]
-    };
+/// The Rust types of GLSL's types, by their names there.
+#[allow(non_camel_case_types, reason = "GLSL's names")]
+pub mod types {
+    /// Single precision.
+    pub type float = f32;
+    /// Signed, 32 bits.
+    pub type int = i32;
+    /// Unsigned, 32 bits.
+    pub type uint = u32;
+    /// Two floats.
+    pub type vec2 = [f32; 2];
+    /// Three floats.
+    pub type vec3 = [f32; 3];
+    /// Four floats.
+    pub type vec4 = [f32; 4];
+    /// Two unsigned numbers.
+    pub type uvec2 = [u32; 2];
+    /// Three unsigned numbers.
+    pub type uvec3 = [u32; 3];
+    /// Four unsigned numbers.
+    pub type uvec4 = [u32; 4];
+    /// An address of device memory; a `uvec2` in shaders.
+    pub type address = u64;
+    /// Eight bytes; a `uvec2` in shaders.
+    pub type bytes8 = [u8; 8];
 }
 
-macro_rules! form {
-    (structure) => {
-        Form::Structure
-    };
-    (push) => {
-        Form::Push
-    };
-    (words) => {
-        Form::Words
-    };
-    (block $access:ident $align:literal) => {
-        Form::Block { access: access!($access), align: $align }
-    };
-    (array $buffer:ident $access:ident $align:literal) => {
-        Form::Array { buffer: stringify!($buffer), access: access!($access), align: $align }
-    };
-}
-
-macro_rules! access {
-    (readwrite) => {
-        ""
-    };
-    ($access:ident) => {
-        stringify!($access)
-    };
-}
-
-/// Declares the records of a file.
+/// Declares the records of a file: its name, the files that it includes, constants, and for each record
+/// its [`Form`] and its fields.
 macro_rules! records {
+    // the type of a field: no array, or one of one or two dimensions
+    (@type $kind:ident) => {
+        $kind
+    };
+    (@type $kind:ident [$count:expr]) => {
+        [$kind; $count]
+    };
+    (@type $kind:ident [$outer:expr] [$inner:expr]) => {
+        [[$kind; $inner]; $outer]
+    };
     (
         $file:literal
         $(includes $($include:literal)+)?
@@ -224,25 +189,24 @@ macro_rules! records {
         })?;
         $(
             $(#[doc = $doc:literal])*
-            $name:ident: $form:ident $($argument:ident)* $($align:literal)? {
+            $name:ident: $form:ident $(($($part:ident: $value_of_part:expr),*))? {
                 $($(#[doc = $field_doc:literal])* $field:ident: $kind:ident $([$count:expr])*,)*
             }
         )*
     ) => {
         #[allow(unused_imports, reason = "a file may have values alone, or records alone")]
-        use super::super::layout::{Field, File, Form, Number, Record, Value};
+        use $crate::interface::layout::{Field, File, Form, Number, Record, Value, types::*};
         $($(
             $(#[doc = $value_doc])*
-            pub const $value: rust_type!($value_kind) = $number;
+            pub const $value: $value_kind = $number;
         )*)?
         $(
-            shared_record! {
-                $(#[doc = $doc])*
-                #[repr(C)]
-                #[derive(Clone, Copy, Debug, Default, PartialEq)]
-                pub struct $name {
-                    $($(#[doc = $field_doc])* pub $field: rust_type!($kind $([$count])*),)*
-                }
+            $(#[doc = $doc])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq)]
+            #[cfg_attr(library, derive(bytemuck::Pod, bytemuck::Zeroable))]
+            pub struct $name {
+                $($(#[doc = $field_doc])* pub $field: records!(@type $kind $([$count])*),)*
             }
         )*
         /// The table from which the GLSL declarations are generated.
@@ -256,14 +220,14 @@ macro_rules! records {
             },)*)?],
             records: &[$(Record {
                 name: stringify!($name),
-                form: form!($form $($argument)* $($align)?),
+                form: Form::$form $({ $($part: $value_of_part),* })?,
                 size: size_of::<$name>(),
                 fields: &[$(Field {
                     name: stringify!($field),
                     kind: stringify!($kind),
                     counts: &[$($count),*],
                     offset: core::mem::offset_of!($name, $field),
-                    size: size_of::<rust_type!($kind $([$count])*)>(),
+                    size: size_of::<records!(@type $kind $([$count])*)>(),
                     doc: &[$($field_doc),*],
                 },)*],
                 doc: &[$($doc),*],

@@ -159,7 +159,7 @@ impl Renderer {
         ]);
         metadata.extend(chosen.map(|options| (CHOSEN, options)));
         let report = FramesReport {
-            integrator: integrator.name(),
+            integrator,
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
             setup,
             preset,
@@ -378,7 +378,7 @@ pub(super) fn colour_channels(realtime: &Realtime) -> Result<Vec<Channel>> {
 
 /// Returns true if frames of the integrator are ambient occlusion, and not radiance.
 pub fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
-    integrator == IntegratorName::default()
+    integrator.can(Capability::AmbientVisibility)
 }
 
 /// Scene data that frames with these settings need.

@@ -12,11 +12,12 @@ use super::{Renderer, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::film::accumulate::Accumulated;
 use crate::gpu::Timing;
-use crate::integrators::IntegratorReport;
+use crate::integrators::{IntegratorName, IntegratorReport};
 use crate::measure::stats::{Summary, percentile};
 use crate::raster::Primary;
 use crate::realtime::{FrameStats, Preset, Settings};
 use crate::scene::{Camera, RenderHints};
+use crate::settings::Capability;
 use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 
 /// Seconds of a run. Those of its parts add up to the total; the others lie within them, and loading and starting the device overlap.
@@ -394,8 +395,8 @@ pub fn milliseconds(ms: f64) -> String {
 pub struct FramesReport {
     /// Scene, device and tracer.
     pub setup: Setup,
-    /// Name of the integrator.
-    pub integrator: &'static str,
+    /// The integrator.
+    pub integrator: IntegratorName,
     /// Name of the quantity of [`FramesReport::mean`].
     pub quantity: &'static str,
     /// The preset.
@@ -509,14 +510,14 @@ impl FramesReport {
     }
 
     fn is_radiance(&self) -> bool {
-        self.integrator != "ao"
+        !self.integrator.can(Capability::AmbientVisibility)
     }
 
     /// The integrator, with the technique of ambient occlusion.
     fn technique_text(&self) -> String {
         match self.is_radiance() {
-            true => self.integrator.to_owned(),
-            false => format!("{} ({})", self.integrator, self.settings.technique),
+            true => self.integrator.name().to_owned(),
+            false => format!("{} ({})", self.integrator.name(), self.settings.technique),
         }
     }
 

@@ -39,6 +39,18 @@ pub fn kinds() -> String {
     LightKind::TYPES.iter().map(|t| format!("{}, ", t.word)).collect::<String>() + OTHER_KINDS
 }
 
+/// The long help of `--light`: what is said in short, then all kinds with their keys.
+pub fn help() -> String {
+    let punctual: String = LightKind::TYPES.iter().map(|t| format!("{}: {}; ", t.word, t.keys)).collect();
+    format!(
+        "Add a light: its kind, then key=value, like \"sun direction=0,-1,0 irradiance=3\"; may be repeated\n\n\
+         Kinds and their keys. {punctual}sphere: position, radius, radiance; rectangle: position, direction, size=W,H, \
+         radiance; disk: position, direction, radius, radiance; portal: position, direction, size=W,H of an opening \
+         through which the environment is sampled, which lessens the noise of rooms. Direction is that in which it \
+         emits; color=R,G,B or temperature=K tints it."
+    )
+}
+
 /// Reads a light's description.
 ///
 /// # Errors

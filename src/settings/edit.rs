@@ -134,18 +134,30 @@ impl<T: Choice> Editable for Option<T> {
     }
 }
 
-/// Types without an editor of their own.
-macro_rules! without_editor {
-    ($($type:ty),*) => {
-        $(impl Editable for $type {
-            fn value(&mut self) -> Value<'_> {
-                Value::Other
-            }
-        })*
-    };
+// types without an editor of their own
+impl Editable for Option<String> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Other
+    }
 }
 
-without_editor!(Option<String>, Option<PathBuf>, Option<DVec3>, Option<[u32; 2]>);
+impl Editable for Option<PathBuf> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Other
+    }
+}
+
+impl Editable for Option<DVec3> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Other
+    }
+}
+
+impl Editable for Option<[u32; 2]> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Other
+    }
+}
 
 impl<T> Editable for Vec<T> {
     fn value(&mut self) -> Value<'_> {

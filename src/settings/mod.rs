@@ -3,10 +3,12 @@
 //! Each setting declares which integrators it applies to, by something that they can do ([`Capability`]), and whether it applies to stills, real-time frames, or both:
 //! [`check`] rejects settings without effect. So an integrator names its capabilities, and no setting names an integrator.
 
+mod choices;
 mod edit;
 mod length;
 pub mod parse;
 
+pub(crate) use choices::choices;
 pub use edit::{Choice, ChoiceValue, Editable, Setting, Value};
 pub use length::Length;
 
@@ -17,12 +19,16 @@ use crate::error::{Error, Result};
 pub enum Capability {
     /// It computes ambient occlusion of a radius and falloff.
     AmbientOcclusion,
+    /// Its values are ambient visibility, from 0 to 1, and no light.
+    AmbientVisibility,
     /// It renders frames in real time.
     RealTimeFrames,
     /// It adds ambient light.
     AmbientLight,
     /// It follows light from surface to surface.
     LightTransport,
+    /// It computes all light of the scene, as other path tracers do.
+    GlobalIllumination,
     /// The length of its paths can be chosen.
     PathLength,
     /// Its directions can be sampled by a strategy of choice.
@@ -39,6 +45,8 @@ pub enum Capability {
     ToneMapping,
     /// Its images can be denoised.
     Denoising,
+    /// It can keep the rays of the first sample.
+    KeptRays,
 }
 
 /// An integrator as settings see it: its name and its capabilities.
@@ -96,6 +104,19 @@ pub enum Level {
 }
 
 impl Level {
+    /// The level that a line of [`settings!`] names: advanced where it names none.
+    ///
+    /// # Panics
+    /// For another word than `basic` or `research`; lines of settings are then not compiled.
+    pub const fn from_words(words: &[&str]) -> Self {
+        match words {
+            [] => Self::Advanced,
+            [word] if matches!(word.as_bytes(), b"basic") => Self::Basic,
+            [word] if matches!(word.as_bytes(), b"research") => Self::Research,
+            _ => panic!("a level is `basic` or `research`"),
+        }
+    }
+
     /// Returns true if `-h` does not list it.
     pub const fn is_hidden_from_short_help(self) -> bool {
         !matches!(self, Self::Basic)
@@ -106,22 +127,6 @@ impl Level {
         matches!(self, Self::Research)
     }
 }
-
-/// The level that [`settings!`] names: advanced where it names none.
-#[cfg(feature = "cli")]
-macro_rules! level {
-    () => {
-        crate::settings::Level::Advanced
-    };
-    (basic) => {
-        crate::settings::Level::Basic
-    };
-    (research) => {
-        crate::settings::Level::Research
-    };
-}
-#[cfg(feature = "cli")]
-pub(crate) use level;
 
 /// A setting that the user has given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,8 +211,12 @@ macro_rules! settings {
                 #[serde(skip_serializing_if = "crate::settings::is_default")]
                 #[cfg_attr(feature = "cli", arg(
                     long,
-                    hide_short_help = crate::settings::level!($($level)?).is_hidden_from_short_help(),
-                    hide_long_help = crate::settings::level!($($level)?).is_hidden_from_long_help(),
+                    hide_short_help = const {
+                        crate::settings::Level::from_words(&[$(stringify!($level))?]).is_hidden_from_short_help()
+                    },
+                    hide_long_help = const {
+                        crate::settings::Level::from_words(&[$(stringify!($level))?]).is_hidden_from_long_help()
+                    },
                     $($option)*
                 ))]
                 pub $field: $type,
@@ -259,84 +268,6 @@ macro_rules! settings {
     };
 }
 pub(crate) use settings;
-
-/// Declares an enumeration of named values: `/// help` and `Variant = "name",` each; the first is the default unless another is named. The documentation of a variant is its help text on the command line.
-macro_rules! choices {
-    (
-        $(#[$meta:meta])*
-        $vis:vis enum $type:ident $((default $default:ident))? {
-            $(
-                $(#[doc = $doc:literal])+
-                $variant:ident = $name:literal,
-            )+
-        }
-    ) => {
-        $(#[$meta])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-        $vis enum $type {
-            $(
-                $(#[doc = $doc])+
-                #[serde(rename = $name)]
-                $variant,
-            )+
-        }
-
-        impl $type {
-            /// All variants.
-            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
-
-            /// Name on the command line and in files.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$variant => $name,)+
-                }
-            }
-
-            /// Description in one line.
-            pub fn help(self) -> &'static str {
-                match self {
-                    $(Self::$variant => concat!($($doc),+).trim(),)+
-                }
-            }
-        }
-
-        impl Default for $type {
-            fn default() -> Self {
-                [$(Self::$default,)? Self::ALL[0]][0]
-            }
-        }
-
-        impl $crate::settings::Choice for $type {
-            const ALL: &'static [Self] = &Self::ALL;
-
-            fn name(self) -> &'static str {
-                self.name()
-            }
-
-            fn help(self) -> &'static str {
-                self.help()
-            }
-        }
-
-        impl std::fmt::Display for $type {
-            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-                f.pad(self.name())
-            }
-        }
-
-        #[cfg(feature = "cli")]
-        impl clap::ValueEnum for $type {
-            fn value_variants<'a>() -> &'a [Self] {
-                &Self::ALL
-            }
-
-            fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
-                Some(clap::builder::PossibleValue::new(self.name()).help(self.help()))
-            }
-        }
-    };
-}
-pub(crate) use choices;
 
 #[cfg(test)]
 mod tests {

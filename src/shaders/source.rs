@@ -1,15 +1,19 @@
-//! Sources of shaders: combines a tracer's template and a pass into one text. Used by build.rs and by the program.
+//! Sources of shaders: a tracer's template and a pass make one text. Used by build.rs and by the
+//! program.
 
 use std::fmt;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Invocations per workgroup of a stream.
 pub const LANES: u32 = 64;
 
-/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work (shaders/trace/spread.glsl).
+/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work
+/// (shaders/trace/spread.glsl).
 pub const SPREAD: u32 = 16;
 
-/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory is prefetched.
+/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory
+/// is prefetched.
 pub const RUN: u32 = 4;
 
 /// Rays per invocation of a packet.
@@ -21,7 +25,8 @@ const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extensi
 /// Enables loads and stores of 64 bits, for devices with 64-bit integers.
 const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
 
-/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to a queue, or none.
+/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to
+/// a queue, or none.
 const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
 /// What a stream finds for its rays.
@@ -54,9 +59,11 @@ impl Mode {
 pub enum Rays {
     /// The pass generates them.
     Generated,
-    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead.
+    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility
+    /// can be rasterized instead.
     Camera,
-    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory (shaders/trace/known.glsl).
+    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory
+    /// (shaders/trace/known.glsl).
     CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,
@@ -113,7 +120,7 @@ pub enum Variant {
 }
 
 impl Variant {
-    /// All of them, in the order of their numbers.
+    /// All of them.
     pub const ALL: [Self; 12] = [
         Self::Generate,
         Self::Generate64,
@@ -166,11 +173,13 @@ impl Variant {
     }
 }
 
-/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of shaders/.
+/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of
+/// shaders/.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub const PROBES: &str = "tests/shaders";
 
-/// Files that shaders include and that are not in shaders/: generated ones, and with the feature `probes` those of the tests. `manifest`: the source tree.
+/// Files that shaders include and that are not in shaders/: generated ones, and with the feature
+/// `probes` those of the tests. `manifest`: the source tree.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
     if cfg!(feature = "probes") {
@@ -223,6 +232,17 @@ pub enum Source {
 }
 
 impl Source {
+    /// Name of the file that build.rs writes its SPIR-V to, without its ending.
+    pub fn file_name(&self) -> String {
+        let bits = |has_64: &bool| if *has_64 { "64" } else { "32" };
+        match self {
+            Self::Stream { pass, mode, variant } => format!("{pass}_{}_{variant:?}", mode.name()),
+            Self::Compute { pass, int64 } => format!("{pass}_{}", bits(int64)),
+            Self::Kernel { mode, ballot } => format!("wide_{}_{}", mode.name(), bits(ballot)),
+            Self::File { path, .. } => path.replace(['/', '.'], "_"),
+        }
+    }
+
     /// Kind of the shader.
     pub fn stage(&self) -> Stage {
         match self {
@@ -232,9 +252,12 @@ impl Source {
         }
     }
 
-    /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops over a thread's four pixels in common/filter.glsl rolled up in a
-    /// form that lavapipe's does not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by itself, and filters take three times as long.
-    /// So it is with the loops over neighbours of `antialias`, which takes half as long without, and of the two that reproject histories (three quarters).
+    /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops
+    /// over a thread's four pixels in common/filter.glsl rolled up in a form that lavapipe's does
+    /// not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by
+    /// itself, and filters take three times as long. So it is with the loops over neighbours of
+    /// `antialias`, which takes half as long without, and of the two that reproject histories
+    /// (three quarters).
     pub fn is_optimized(&self) -> bool {
         !matches!(
             self,
@@ -288,29 +311,108 @@ impl fmt::Display for Source {
     }
 }
 
-// the keywords of registry.rs
-macro_rules! mode {
-    (any) => {
-        Mode::Any
-    };
-    (closest) => {
-        Mode::Closest
-    };
+/// A shader. SPIR-V is reached by the name of its file ([`Source::file_name`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shader {
+    source: Source,
 }
 
-macro_rules! rays {
-    (generated) => {
-        Rays::Generated
-    };
-    (camera) => {
-        Rays::Camera
-    };
-    (camera_or_known) => {
-        Rays::CameraOrKnown
-    };
-    (queue) => {
-        Rays::Queue
-    };
+impl Shader {
+    /// The shader that is compiled from a source.
+    pub const fn new(source: Source) -> Self {
+        Self { source }
+    }
+
+    /// The shader that is a whole file of shaders/.
+    pub const fn from_file(path: &'static str, stage: Stage) -> Self {
+        Self::new(Source::File { path, stage })
+    }
+
+    /// Its source.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
 }
 
-pub(crate) use {mode, rays};
+/// A pass that traces rays: a shader for each tracer and step.
+pub struct StreamShaders {
+    /// File in shaders/, without its ending; label of its timings if the stream is a single shader.
+    pub pass: &'static str,
+    /// What it finds for each ray.
+    pub mode: Mode,
+    /// Source of its rays.
+    pub rays: Rays,
+    labels: OnceLock<Labels>,
+}
+
+/// Texts that are made of the names of a pass and its mode, once.
+struct Labels {
+    name: String,
+    steps: [String; 3],
+}
+
+impl StreamShaders {
+    /// The pass `shaders/PASS.glsl` in a mode.
+    pub const fn new(pass: &'static str, mode: Mode, rays: Rays) -> Self {
+        Self { pass, mode, rays, labels: OnceLock::new() }
+    }
+
+    /// Pass and mode.
+    pub fn name(&self) -> &str {
+        &self.labels().name
+    }
+
+    /// Labels of the timings of each step if the stream is three shaders.
+    pub fn steps(&self) -> [&str; 3] {
+        self.labels().steps.each_ref().map(String::as_str)
+    }
+
+    fn labels(&self) -> &Labels {
+        self.labels.get_or_init(|| Labels {
+            name: format!("{} {}", self.pass, self.mode.name()),
+            steps: ["generate", "trace", "deliver"].map(|step| format!("{} {step}", self.pass)),
+        })
+    }
+
+    /// Its shader for a tracer and step; `None` where [`Variant::applies_to`] says so.
+    pub fn variant(&self, variant: Variant) -> Option<Shader> {
+        let source = Source::Stream { pass: self.pass, mode: self.mode, variant };
+        variant.applies_to(self.rays).then_some(Shader::new(source))
+    }
+
+    /// All its shaders.
+    pub fn variants(&self) -> impl Iterator<Item = Shader> {
+        Variant::ALL.into_iter().filter_map(|variant| self.variant(variant))
+    }
+}
+
+impl fmt::Debug for StreamShaders {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A pass that traces no rays: a shader for devices with 64-bit integers, and one for those
+/// without.
+#[derive(Debug)]
+pub struct ComputeShader {
+    /// File in shaders/, without its ending.
+    pub name: &'static str,
+}
+
+impl ComputeShader {
+    /// The pass `shaders/NAME.glsl`.
+    pub const fn new(name: &'static str) -> Self {
+        Self { name }
+    }
+
+    /// The shader for devices with or without 64-bit integers.
+    pub fn variant(&self, int64: bool) -> Shader {
+        Shader::new(Source::Compute { pass: self.name, int64 })
+    }
+
+    /// All its shaders.
+    pub fn variants(&self) -> [Shader; 2] {
+        [false, true].map(|int64| self.variant(int64))
+    }
+}

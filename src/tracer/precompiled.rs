@@ -19,7 +19,7 @@ const MIN_PRIMITIVES: usize = 100_000;
 #[derive(Clone)]
 pub(super) struct PipelineSpec {
     pub name: &'static str,
-    pub shader: &'static Shader,
+    pub shader: Shader,
     pub specialization: Specialization,
     /// It traces packets and needs full subgroups.
     pub packets: bool,
@@ -76,11 +76,11 @@ impl PrecompiledPipelines {
 impl PipelineSpec {
     fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
         let make = if self.packets { ComputePipeline::with_full_subgroups } else { ComputePipeline::new };
-        make(device, self.name, self.shader, &self.specialization)
+        make(device, self.name, &self.shader, &self.specialization)
     }
 
     fn is(&self, other: &PipelineSpec) -> bool {
-        std::ptr::eq(self.shader, other.shader) && self.specialization == other.specialization
+        self.shader == other.shader && self.specialization == other.specialization
     }
 }
 
@@ -111,7 +111,7 @@ pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShad
 pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> PipelineSpec {
     let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
     let (name, shader) = match packet {
-        Some(shader) => (shaders.name, shader),
+        Some(shader) => (shaders.name(), shader),
         None => ("wide kernel", wide_kernel(shaders.mode, stream::has_ballots(info))),
     };
     PipelineSpec { name, shader, specialization: s.clone(), packets: packet.is_some() }

@@ -121,8 +121,8 @@ fn compile(
     s: &Specialization,
 ) -> Result<Arc<ComputePipeline>> {
     let shader =
-        shaders.variant(variant).ok_or_else(|| Error::Usage(format!("'{}' is not made for {variant:?}", shaders.name)))?;
-    ComputePipeline::new(device, shaders.name, shader, s).map(Arc::new)
+        shaders.variant(variant).ok_or_else(|| Error::Usage(format!("'{}' is not made for {variant:?}", shaders.name())))?;
+    ComputePipeline::new(device, shaders.name(), &shader, s).map(Arc::new)
 }
 
 impl Stream {
@@ -208,8 +208,8 @@ impl Stream {
             sphere: features.spheres.then_some([&shaders::SPHERE_CLOSEST, &shaders::SPHERE_INTERSECTION]),
         };
         let raygen =
-            stream.variant(Variant::Raygen).ok_or_else(|| Error::Usage(format!("'{}' has no raygen shader", stream.name)))?;
-        let pipeline = RayTracingPipeline::new(device, stream.name, raygen, &shared, s)?;
+            stream.variant(Variant::Raygen).ok_or_else(|| Error::Usage(format!("'{}' has no raygen shader", stream.name())))?;
+        let pipeline = RayTracingPipeline::new(device, stream.name(), &raygen, &shared, s)?;
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
@@ -217,7 +217,10 @@ impl Stream {
     /// ([`crate::raster`]).
     pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
-            return Err(Error::Usage(format!("the rays of '{}' are not camera rays: they cannot be rasterized", shaders.name)));
+            return Err(Error::Usage(format!(
+                "the rays of '{}' are not camera rays: they cannot be rasterized",
+                shaders.name()
+            )));
         }
         let pipeline = compile(device, shaders, Variant::Visibility, s)?;
         Ok(Self { pipeline: Pipeline::Rasterized(pipeline), shaders })
@@ -236,7 +239,7 @@ impl Stream {
             return;
         }
         let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Rasterized(_));
-        debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
+        debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name());
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
@@ -249,8 +252,8 @@ impl Stream {
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
                 let most = memory.capacity;
-                debug_assert!(in_memory || push.count <= most, "{}: results would overwrite each other", self.shaders.name);
-                let [generating, tracing, delivering] = self.shaders.steps;
+                debug_assert!(in_memory || push.count <= most, "{}: results would overwrite each other", self.shaders.name());
+                let [generating, tracing, delivering] = self.shaders.steps();
                 for first in (0..push.count).step_by(most as usize) {
                     let mut push = Push { first: push.first + first, count: most.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next

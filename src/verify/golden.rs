@@ -6,7 +6,6 @@ use super::manifest::{Frame, GoldenFormat};
 use super::text::plural;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
-use crate::integrators::IntegratorName;
 use crate::measure::z_test::{Estimate, MIN_REPLICATES, Reference, Region, TILE, channels_with_variance};
 use crate::output::exr::ExrOptions;
 use crate::output::{self, Channel, Image, Samples, png_text};
@@ -200,7 +199,7 @@ pub fn shown_image(frame: &Frame, image: &Image) -> Image {
     let settings = &frame.settings;
     match settings.realtime_setting() {
         // ambient visibility is shown as it is
-        Some(_) if settings.integrator() == IntegratorName::default() => {
+        Some(_) if settings.integrator().can(Capability::AmbientVisibility) => {
             Image { channels: image.channels.iter().filter(|c| c.name == "Y").cloned().collect(), ..image.clone() }
         }
         _ => settings.integrator().get().picture(image, &settings.picture.options()),

@@ -52,13 +52,13 @@ impl Technique {
             Self::Preset(preset) => format!("AO {}", word(preset.name())),
             Self::Gtao => "GTAO (screen space)".into(),
             Self::Frames(integrator) => format!("{}, real time", word(integrator.name())),
-            Self::Still(integrator) => match integrator.name() {
-                "ao" => "AO still".into(),
-                "ao-sky" => "AO truth (ao-sky)".into(),
-                // of the others there are buffers, too
-                name if self.is_view_of_surfaces() && name != "albedo" => format!("{}, antialiased", word(name)),
-                name => word(name),
-            },
+            Self::Still(integrator) if integrator.can(Capability::AmbientVisibility) => "AO still".into(),
+            Self::Still(integrator) if integrator.can(Capability::WhiteSky) => format!("AO truth ({})", integrator.name()),
+            // of views that are no colours there are buffers, too
+            Self::Still(integrator) if self.is_view_of_surfaces() && !integrator.can(Capability::ToneMapping) => {
+                format!("{}, antialiased", word(integrator.name()))
+            }
+            Self::Still(integrator) => word(integrator.name()),
             Self::Buffer(mode) => word(mode.name()),
             Self::Converged => "AO converged".into(),
         }
@@ -80,14 +80,13 @@ impl Technique {
     /// Returns true for stills that show a property of surfaces rather than light or occlusion.
     fn is_view_of_surfaces(self) -> bool {
         let Self::Still(integrator) = self else { return false };
-        !["ao", "ao-sky"].contains(&integrator.name()) && !integrator.get().capabilities().contains(&Capability::LightTransport)
+        !integrator.can(Capability::AmbientVisibility) && !integrator.can(Capability::LightTransport)
     }
 
     /// Returns true for stills of light that can be frames in real time, too.
     fn has_frames(self) -> bool {
         let Self::Still(integrator) = self else { return false };
-        let capabilities = integrator.get().capabilities();
-        capabilities.contains(&Capability::LightTransport) && capabilities.contains(&Capability::RealTimeFrames)
+        integrator.can(Capability::LightTransport) && integrator.can(Capability::RealTimeFrames)
     }
 
     /// The technique that settings select: what the viewer shows first with them.
@@ -96,7 +95,7 @@ impl Technique {
         let buffer = settings.frames.show.filter(|show| *show != DisplayMode::Result);
         match (settings.integrator, buffer) {
             (Some(integrator), _) if settings.realtime_setting().is_none() => Self::Still(integrator),
-            (Some(integrator), None) if integrator != IntegratorName::default() => Self::Frames(integrator),
+            (Some(integrator), None) if !integrator.can(Capability::AmbientVisibility) => Self::Frames(integrator),
             (_, Some(buffer)) => Self::Buffer(buffer),
             _ if settings.frames.technique == Some(AoTechnique::Gtao) => Self::Gtao,
             _ => Self::Preset(preset),
@@ -114,14 +113,16 @@ impl Technique {
     /// What it is an estimate of: the truth that it is compared with unless another is chosen.
     pub fn truth(self) -> Self {
         let integrator = self.integrator();
-        if integrator == IntegratorName::default() { Self::Converged } else { Self::Still(integrator) }
+        if integrator.can(Capability::AmbientVisibility) { Self::Converged } else { Self::Still(integrator) }
     }
 
     /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.
     pub fn is_occlusion(self) -> bool {
         match self {
             Self::Preset(_) | Self::Gtao | Self::Converged => true,
-            Self::Still(integrator) | Self::Frames(integrator) => ["ao", "ao-sky"].contains(&integrator.name()),
+            Self::Still(integrator) | Self::Frames(integrator) => {
+                integrator.can(Capability::AmbientVisibility) || integrator.can(Capability::WhiteSky)
+            }
             Self::Buffer(mode) => mode == DisplayMode::Unfiltered,
         }
     }

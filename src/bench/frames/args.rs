@@ -118,7 +118,7 @@ impl BenchFramesArgs {
     pub fn wants(&self, part: Part) -> bool {
         match self.parts.as_slice() {
             // its scenes are its own
-            [] => part != Part::Bounces || self.scenes.is_empty() && self.integrator.name() == "path",
+            [] => part != Part::Bounces || self.scenes.is_empty() && self.integrator.can(Capability::GlobalIllumination),
             parts => parts.contains(&part),
         }
     }
@@ -130,7 +130,7 @@ impl BenchFramesArgs {
 
     /// Does any part show what peers render, the paths of a still camera?
     pub fn wants_peers(&self) -> bool {
-        self.integrator.name() == "path" && self.wants(Part::Still)
+        self.integrator.can(Capability::GlobalIllumination) && self.wants(Part::Still)
     }
 
     fn has(&self, preset: Preset) -> bool {

@@ -9,6 +9,7 @@ use crate::cli::args::LoadArgs;
 use crate::cli::config::ConfigArgs;
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
+use crate::integrators;
 use crate::output::frames::FramePattern;
 use crate::output::settings::ExrCompression;
 use crate::output::{FileSettings, ImageFormat, apng};
@@ -16,6 +17,7 @@ use crate::realtime::display::DisplayMode;
 use crate::renderer::RenderSettings;
 use crate::renderer::defaults::{self, DefaultsReport};
 use crate::renderer::frames::frame_settings;
+use crate::settings::{AppliesTo, Capability, GivenSetting};
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
 
@@ -145,9 +147,10 @@ impl RenderArgs {
         if let (Some(frames), Some((_, option, remedy))) = (frames, of_stills.iter().find(|o| o.0)) {
             return wrong(format!("{option} is for stills, and {} selects frames in real time: {remedy}", frames.option()));
         }
-        if self.dump_rays.is_some() && self.settings.integrator().name() != "ao" {
-            let name = self.settings.integrator().name();
-            return wrong(format!("--dump-rays has no effect on --integrator {name}: leave it out, or use --integrator ao"));
+        if self.dump_rays.is_some() {
+            let applies = AppliesTo::stills_of(Capability::KeptRays);
+            let dump_rays = GivenSetting { name: "dump_rays", applies };
+            integrators::check(&[dump_rays], self.settings.integrator(), None)?;
         }
         if !self.settings.image.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
             return wrong("--aov needs an .exr output: pictures hold colour only".into());

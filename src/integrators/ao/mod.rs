@@ -123,7 +123,13 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn capabilities(&self) -> &'static [Capability] {
-        &[Capability::AmbientOcclusion, Capability::RealTimeFrames, Capability::Denoising]
+        &[
+            Capability::AmbientOcclusion,
+            Capability::AmbientVisibility,
+            Capability::RealTimeFrames,
+            Capability::Denoising,
+            Capability::KeptRays,
+        ]
     }
 
     fn channels(&self) -> &'static [&'static str] {

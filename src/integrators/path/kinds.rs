@@ -15,8 +15,8 @@ use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJ
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
 use crate::settings::Capability::{
-    self, AmbientLight, AmbientOcclusion, CameraModel, Denoising, LightTransport, PathLength, RealTimeFrames, SamplingStrategy,
-    SceneLights, Textures, ToneMapping, WhiteSky,
+    self, AmbientLight, AmbientOcclusion, CameraModel, Denoising, GlobalIllumination, LightTransport, PathLength,
+    RealTimeFrames, SamplingStrategy, SceneLights, Textures, ToneMapping, WhiteSky,
 };
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -28,6 +28,7 @@ pub static PATH: PathVariant = PathVariant {
     kind: Kind::Light { max_depth: None },
     capabilities: &[
         LightTransport,
+        GlobalIllumination,
         PathLength,
         SamplingStrategy,
         SceneLights,

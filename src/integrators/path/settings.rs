@@ -1,6 +1,7 @@
-//! Settings of path tracing and of the integrators based on it: the settings as given ([`PathSettings`]), the resolved options of a render ([`PathOptions`]),
-//! the shader features that they require, and their metadata and JSON record. An option that is a number which shaders read is added to the list in
-//! src/interface/path_options.rs; any other here.
+//! Settings of path tracing and of the integrators based on it: the settings as given
+//! ([`PathSettings`]), the resolved options of a render ([`PathOptions`]), the shader features that
+//! they require, and their metadata and JSON record. An option that is a number in shaders is also
+//! a field of [`PathOptionsRecord`].
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,9 +16,7 @@ use crate::error::{Error, Result};
 use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
 use crate::integrators::RenderJob;
-use crate::interface::PathFeature;
-use crate::interface::path_options::path_options;
-use crate::interface::records::path_options::PathOptionsRecord;
+use crate::interface::{PathFeature, PathOptionsRecord};
 use crate::scene::Projection;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
@@ -38,7 +37,8 @@ const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
 /// The integrator with ambient light.
 const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
 
-/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl) ends paths long before.
+/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl)
+/// ends paths long before.
 pub const MAX_DEPTH: u32 = 4096;
 
 /// Default albedo of `ao-sky`.
@@ -47,7 +47,8 @@ const SKY_ALBEDO: f64 = 0.5;
 const SENSOR_HEIGHT: f64 = 0.024;
 
 choices! {
-    /// How directions are sampled. All strategies estimate the same image; all but the first are for comparison.
+    /// How directions are sampled. All strategies estimate the same image; all but the first are
+    /// for comparison.
     pub enum Strategy {
         /// Multiple importance sampling of BSDF and lights, power heuristic (Veach 1997)
         Mis = "mis",
@@ -87,209 +88,236 @@ pub struct Lens {
     pub focus: f32,
 }
 
-/// The Rust type of a number in shaders.
-macro_rules! number {
-    (uint) => {
-        u32
-    };
-    (float) => {
-        f32
-    };
+settings! {
+    /// Paths.
+    "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
+    pub struct PathSettings {
+        /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the
+        /// scene's, or no limit]
+        max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
+        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene,
+        /// 2 leaves indirect light alone [default: 0]
+        min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
+        /// Bounces before Russian roulette may end a path [default: 5]
+        rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
+        /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
+        firefly_clamp: Option<f64>,
+            option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT);
+        /// Scale factor of indirect light, of two bounces or more; biased but for 1 [default: 1]
+        indirect_scale: Option<f64>,
+            option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT), research;
+        /// Sampling strategy; all but the default are for comparison [default: mis]
+        sampling: Option<Strategy>, option(value_enum), applies(SAMPLED), research;
+        /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
+        energy_compensation: bool, option(), applies(LIGHT);
+        /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
+        sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY), research;
+        /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
+        ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
+        /// How the environment lights surfaces with --integrator lit [default: traced]
+        environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
+        /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
+        occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
+        /// Texture filter of paths [default: bilinear]
+        texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
+        /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres
+        /// [default: a pinhole]
+        f_number: Option<f64>,
+            option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);
+        /// Focus distance along the view, in scene units
+        focus_distance: Option<f64>,
+            option(value_name = "D", value_parser = parse_positive, requires = "f_number", allow_hyphen_values = true), applies(CAMERA);
+    }
 }
 
-/// Declares all that has an item for each option in the list of src/interface/path_options.rs.
-macro_rules! declare_options {
-    ($(
-        $(#[doc = $doc:literal])+
-        $field:ident: $type:ident as $kind:ident = $default:expr, setting($($setting:tt)*)
-        $(, feature($feature:ident = $constant:literal, $label:literal))? $(, remark($remark:literal))?;
-    )*) => {
-        settings! {
-            /// Paths.
-            "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
-            pub struct PathSettings {
-                /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
-                max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
-                $(
-                    $(#[doc = $doc])+
-                    $field: Option<$type>, $($setting)*;
-                )*
-                /// Sampling strategy; all but the default are for comparison [default: mis]
-                sampling: Option<Strategy>, option(value_enum), applies(SAMPLED), research;
-                /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
-                energy_compensation: bool, option(), applies(LIGHT);
-                /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
-                sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY), research;
-                /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
-                ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
-                /// How the environment lights surfaces with --integrator lit [default: traced]
-                environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
-                /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
-                occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
-                /// Texture filter of paths [default: bilinear]
-                texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
-                /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
-                f_number: Option<f64>,
-                    option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);
-                /// Focus distance along the view, in scene units
-                focus_distance: Option<f64>,
-                    option(value_name = "D", value_parser = parse_positive, requires = "f_number", allow_hyphen_values = true), applies(CAMERA);
-            }
-        }
-
-        /// Options of a path-traced image.
-        #[derive(Clone, Debug)]
-        pub struct PathOptions {
-            /// Image size in pixels.
-            pub size: [u32; 2],
-            /// Paths per pixel.
-            pub spp: u32,
-            /// Seed of the sampler.
-            pub seed: u32,
-            /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most [`MAX_DEPTH`].
-            pub max_depth: u32,
-            /// Sampling strategy.
-            pub strategy: Strategy,
-            /// Continue paths by delta lobes only, so that light sampling accounts for all other light: with [`Strategy::Light`].
-            pub specular_only: bool,
-            /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
-            pub white_sky: Option<f32>,
-            /// Ambient light at the first surface of each path.
-            pub ambient: Option<Ambient>,
-            /// The environment is seen by the camera and lights no surface.
-            pub background_only: bool,
-            /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
-            pub view: Option<View>,
-            /// Pixel reconstruction filter.
-            pub pixel_filter: PixelFilter,
-            /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
-            pub texture_filter: TextureFilter,
-            /// Thin lens of a perspective camera; `None`: a pinhole.
-            pub lens: Option<Lens>,
-            /// Stop after this time and keep the image so far.
-            pub time_limit: Option<Duration>,
-            /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
-            pub tile_mask: Option<Arc<TileMask>>,
-            /// The film to resume, and when to save it.
-            pub film: FilmOptions,
-            $(
-                $(#[doc = $doc])+
-                pub $field: number!($kind),
-            )*
-        }
-
-        impl Default for PathOptions {
-            fn default() -> Self {
-                Self {
-                    size: [1280, 720],
-                    spp: 16,
-                    seed: 0,
-                    max_depth: MAX_DEPTH,
-                    strategy: Strategy::Mis,
-                    specular_only: false,
-                    white_sky: None,
-                    ambient: None,
-                    background_only: false,
-                    view: None,
-                    pixel_filter: PixelFilter::Box,
-                    texture_filter: TextureFilter::Bilinear,
-                    lens: None,
-                    time_limit: None,
-                    tile_mask: None,
-                    film: FilmOptions::default(),
-                    $($field: $default,)*
-                }
-            }
-        }
-
-        impl PathSettings {
-            /// The values of settings that are not given, by name.
-            pub fn defaults() -> Map<String, Value> {
-                let numbers = [$((stringify!($field), json!($default)),)*];
-                let others = [
-                    ("sampling", json!(Strategy::default())),
-                    ("texture_filter", json!(TextureFilter::default())),
-                    ("sky_albedo", json!(SKY_ALBEDO)),
-                ];
-                numbers.into_iter().chain(others).filter(|(_, v)| !v.is_null()).map(|(k, v)| (k.to_owned(), v)).collect()
-            }
-        }
-
-        impl PathOptions {
-            /// The options that the samples of an image depend on, each with its key, its text in an image's metadata (`None`: the key is absent), and its value in the JSON
-            /// record.
-            fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
-                // without `..`, so that a new option must be added here
-                let Self {
-                    size: _,
-                    spp: _,
-                    time_limit: _,
-                    tile_mask: _,
-                    film: _,
-                    seed: _,
-                    max_depth,
-                    $($field,)*
-                    strategy,
-                    white_sky,
-                    ambient,
-                    background_only,
-                    view,
-                    specular_only: _,
-                    pixel_filter,
-                    texture_filter,
-                    lens,
-                } = self;
-                let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
-                let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
-                let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
-                let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
-                vec![
-                    ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
-                    ("sampling", Some(strategy.to_string()), json!(strategy)),
-                    $((stringify!($field), text_of_number($field, &$default, <[&str]>::is_empty(&[$($label)?])), json!($field)),)*
-                    ("pixel_filter", Some(pixel_filter.to_string()), json!(pixel_filter)),
-                    ("texture_filter", lookup, json!(texture_filter)),
-                    ("lens", aperture, json!(lens)),
-                    ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
-                    ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
-                    ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
-                    // the name of the integrator says it in metadata
-                    ("view", None, json!(view)),
-                ]
-            }
-
-            /// Replaces the numbers for which there is a setting.
-            fn set_numbers(&mut self, settings: &PathSettings) {
-                $(
-                    if let Some(value) = settings.$field {
-                        self.$field = value as number!($kind);
-                    }
-                )*
-            }
-
-            /// The numbers as shaders read them.
-            fn numbers(&self) -> PathOptionsRecord {
-                PathOptionsRecord { $($field: self.$field,)* ..Default::default() }
-            }
-
-            /// Shader features that the numbers require.
-            fn number_features(&self) -> Vec<(PathFeature, bool)> {
-                vec![$($((PathFeature::$feature, self.$field != $default),)?)*]
-            }
-
-            /// Remarks for the user about bias that numbers bring into the image.
-            fn number_remarks(&self) -> Vec<String> {
-                let remarks: Vec<Option<String>> = vec![$($((self.$field != $default).then(|| format!($remark, self.$field)),)?)*];
-                remarks.into_iter().flatten().collect()
-            }
-        }
-    };
+/// Options of a path-traced image.
+#[derive(Clone, Debug)]
+pub struct PathOptions {
+    /// Image size in pixels.
+    pub size: [u32; 2],
+    /// Paths per pixel.
+    pub spp: u32,
+    /// Seed of the sampler.
+    pub seed: u32,
+    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most
+    /// [`MAX_DEPTH`].
+    pub max_depth: u32,
+    /// Sampling strategy.
+    pub strategy: Strategy,
+    /// Continue paths by delta lobes only, so that light sampling accounts for all other light:
+    /// with [`Strategy::Light`].
+    pub specular_only: bool,
+    /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the
+    /// rendering equation that ambient occlusion approximates.
+    pub white_sky: Option<f32>,
+    /// Ambient light at the first surface of each path.
+    pub ambient: Option<Ambient>,
+    /// The environment is seen by the camera and lights no surface.
+    pub background_only: bool,
+    /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
+    pub view: Option<View>,
+    /// Pixel reconstruction filter.
+    pub pixel_filter: PixelFilter,
+    /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
+    pub texture_filter: TextureFilter,
+    /// Thin lens of a perspective camera; `None`: a pinhole.
+    pub lens: Option<Lens>,
+    /// Stop after this time and keep the image so far.
+    pub time_limit: Option<Duration>,
+    /// Tiles of the image that show geometry; only if the environment is black and
+    /// [`PathOptions::is_sharp`].
+    pub tile_mask: Option<Arc<TileMask>>,
+    /// The film to resume, and when to save it.
+    pub film: FilmOptions,
+    /// Minimum number of bounces: shorter paths are left out.
+    pub min_depth: u32,
+    /// Bounces before Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Radiance to which indirect light is clamped; infinite: it is not.
+    pub firefly_clamp: f32,
+    /// Scale factor of indirect light, of two bounces or more.
+    pub indirect_scale: f32,
 }
-path_options!(declare_options);
 
-/// An option's text in metadata: none where it is the default, except for an option that shaders read in any case.
-fn text_of_number<T: PartialEq + ToString>(number: &T, default: &T, is_always_read: bool) -> Option<String> {
-    (is_always_read || number != default).then(|| number.to_string())
+impl Default for PathOptions {
+    fn default() -> Self {
+        Self {
+            size: [1280, 720],
+            spp: 16,
+            seed: 0,
+            max_depth: MAX_DEPTH,
+            strategy: Strategy::Mis,
+            specular_only: false,
+            white_sky: None,
+            ambient: None,
+            background_only: false,
+            view: None,
+            pixel_filter: PixelFilter::Box,
+            texture_filter: TextureFilter::Bilinear,
+            lens: None,
+            time_limit: None,
+            tile_mask: None,
+            film: FilmOptions::default(),
+            min_depth: 0,
+            rr_depth: 5,
+            firefly_clamp: f32::INFINITY,
+            indirect_scale: 1.0,
+        }
+    }
+}
+
+impl PathSettings {
+    /// The values of settings that are not given, by name.
+    pub fn defaults() -> Map<String, Value> {
+        let options = PathOptions::default();
+        let defaults = [
+            ("min_depth", json!(options.min_depth)),
+            ("rr_depth", json!(options.rr_depth)),
+            ("firefly_clamp", json!(options.firefly_clamp)),
+            ("indirect_scale", json!(options.indirect_scale)),
+            ("sampling", json!(Strategy::default())),
+            ("texture_filter", json!(TextureFilter::default())),
+            ("sky_albedo", json!(SKY_ALBEDO)),
+        ];
+        defaults.into_iter().filter(|(_, v)| !v.is_null()).map(|(k, v)| (k.to_owned(), v)).collect()
+    }
+}
+
+impl PathOptions {
+    /// The options that the samples of an image depend on, each with its key, its text in an
+    /// image's metadata (`None`: the key is absent), and its value in the JSON record.
+    fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
+        // without `..`, so that a new option must be added here
+        let Self {
+            size: _,
+            spp: _,
+            time_limit: _,
+            tile_mask: _,
+            film: _,
+            seed: _,
+            max_depth,
+            min_depth,
+            rr_depth,
+            firefly_clamp,
+            indirect_scale,
+            strategy,
+            white_sky,
+            ambient,
+            background_only,
+            view,
+            specular_only: _,
+            pixel_filter,
+            texture_filter,
+            lens,
+        } = self;
+        let default = Self::default();
+        let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
+        let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
+        let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
+        let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
+        vec![
+            ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
+            ("sampling", Some(strategy.to_string()), json!(strategy)),
+            ("min_depth", text_unless_default(min_depth, &default.min_depth), json!(min_depth)),
+            // shaders read it in any case
+            ("rr_depth", Some(rr_depth.to_string()), json!(rr_depth)),
+            ("firefly_clamp", text_unless_default(firefly_clamp, &default.firefly_clamp), json!(firefly_clamp)),
+            ("indirect_scale", text_unless_default(indirect_scale, &default.indirect_scale), json!(indirect_scale)),
+            ("pixel_filter", Some(pixel_filter.to_string()), json!(pixel_filter)),
+            ("texture_filter", lookup, json!(texture_filter)),
+            ("lens", aperture, json!(lens)),
+            ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
+            ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
+            ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
+            // the name of the integrator says it in metadata
+            ("view", None, json!(view)),
+        ]
+    }
+
+    /// Replaces the numbers for which there is a setting.
+    fn set_numbers(&mut self, settings: &PathSettings) {
+        let PathSettings { min_depth, rr_depth, firefly_clamp, indirect_scale, .. } = settings;
+        self.min_depth = min_depth.unwrap_or(self.min_depth);
+        self.rr_depth = rr_depth.unwrap_or(self.rr_depth);
+        self.firefly_clamp = firefly_clamp.map_or(self.firefly_clamp, |x| x as f32);
+        self.indirect_scale = indirect_scale.map_or(self.indirect_scale, |x| x as f32);
+    }
+
+    /// The numbers as shaders read them.
+    fn numbers(&self) -> PathOptionsRecord {
+        PathOptionsRecord {
+            min_depth: self.min_depth,
+            rr_depth: self.rr_depth,
+            firefly_clamp: self.firefly_clamp,
+            indirect_scale: self.indirect_scale,
+            reserved: Default::default(),
+        }
+    }
+
+    /// Shader features that the numbers require.
+    fn number_features(&self) -> Vec<(PathFeature, bool)> {
+        let default = Self::default();
+        vec![
+            (PathFeature::MinDepth, self.min_depth != default.min_depth),
+            (PathFeature::Clamp, self.firefly_clamp != default.firefly_clamp),
+            (PathFeature::IndirectScale, self.indirect_scale != default.indirect_scale),
+        ]
+    }
+
+    /// Remarks for the user about bias that numbers bring into the image.
+    fn number_remarks(&self) -> Vec<String> {
+        let default = Self::default();
+        let clamped = (self.firefly_clamp != default.firefly_clamp)
+            .then(|| format!("indirect radiance clamped to {}: biased, too dark", self.firefly_clamp));
+        let scaled = (self.indirect_scale != default.indirect_scale)
+            .then(|| format!("indirect light scaled by {}: biased", self.indirect_scale));
+        clamped.into_iter().chain(scaled).collect()
+    }
+}
+
+/// An option's text in metadata: none where it is the default.
+fn text_unless_default<T: PartialEq + ToString>(number: &T, default: &T) -> Option<String> {
+    (number != default).then(|| number.to_string())
 }
 
 impl PathSettings {
@@ -334,7 +362,8 @@ impl PathOptions {
         Ok(options)
     }
 
-    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key is absent.
+    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key
+    /// is absent.
     pub fn identity(&self) -> Vec<(&'static str, Option<String>)> {
         self.described().into_iter().map(|(key, text, _)| (key, text)).collect()
     }
@@ -405,4 +434,55 @@ impl PathOptions {
 /// Text of a maximum number of bounces.
 pub(super) fn depth_text(max_depth: u32) -> String {
     if max_depth >= MAX_DEPTH { "unlimited".into() } else { max_depth.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::interface::path_options;
+
+    /// Every option that is a number in shaders is a setting, an option, and described; and shaders
+    /// get its value.
+    #[test]
+    fn numbers_stand_in_every_table() {
+        let fields = path_options::FILE.records[0].fields.iter();
+        let numbers: BTreeSet<&str> = fields.map(|f| f.name).filter(|name| *name != "reserved").collect();
+        assert!(numbers.len() >= 4);
+        let described: BTreeSet<&str> = PathOptions::default().described().iter().map(|d| d.0).collect();
+        assert!(numbers.is_subset(&described), "{numbers:?} are not all in {described:?}");
+        let mut settings = PathSettings::default();
+        for name in numbers {
+            let mut setting = settings.editable().into_iter().find(|s| s.name == name).expect(name);
+            let before = setting.is_given();
+            match &mut setting.value {
+                crate::settings::Value::Count(count) => **count = Some(7),
+                crate::settings::Value::Number(number) => **number = Some(0.5),
+                _ => panic!("{name} is no number"),
+            }
+            assert!(!before && setting.is_given());
+            let mut options = PathOptions::default();
+            options.set_numbers(&settings);
+            assert_ne!(options.numbers(), PathOptions::default().numbers(), "shaders do not get {name}");
+            let value = |options: &PathOptions| options.described().into_iter().find(|d| d.0 == name).map(|d| (d.1, d.2));
+            assert_ne!(value(&options), value(&PathOptions::default()), "{name} is not described");
+            settings = PathSettings::default();
+        }
+    }
+
+    /// An option that needs code of its own in shaders has it, and one that makes images biased is
+    /// remarked on.
+    #[test]
+    fn numbers_have_their_features_and_remarks() {
+        let enabled = |options: &PathOptions| -> Vec<PathFeature> {
+            options.number_features().into_iter().filter(|f| f.1).map(|f| f.0).collect()
+        };
+        let default = PathOptions::default();
+        assert!(enabled(&default).is_empty() && default.remarks().is_empty());
+        let all = PathOptions { min_depth: 1, firefly_clamp: 2.0, indirect_scale: 0.5, ..default };
+        assert_eq!(enabled(&all), [PathFeature::MinDepth, PathFeature::Clamp, PathFeature::IndirectScale]);
+        let expected = ["indirect radiance clamped to 2: biased, too dark", "indirect light scaled by 0.5: biased"];
+        assert_eq!(all.remarks(), expected);
+    }
 }

@@ -4,7 +4,7 @@ records! {
     "aov";
 
     /// What the ray through a pixel's centre hits.
-    AovPixel: words {
+    AovPixel: Words {
         /// Distance along the ray, scene units; infinite for a miss.
         depth: float,
         /// Index into the scene's instances; `INVALID` for a miss.

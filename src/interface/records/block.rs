@@ -15,7 +15,7 @@ records! {
     };
 
     /// A block of an image, its camera, and what its passes read and write.
-    BlockParams: block readonly 16 {
+    BlockParams: Block(access: "readonly", align: 16) {
         /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
         /// Half width and half height of the view: tangents for a perspective camera, scene units for an orthographic one.

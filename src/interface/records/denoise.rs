@@ -11,7 +11,7 @@ records! {
     };
 
     /// Statistics of a pixel's radiance samples.
-    RadianceRecord: words {
+    RadianceRecord: Words {
         /// Mean, linear RGB.
         mean: vec3,
         /// Number of samples.
@@ -23,7 +23,7 @@ records! {
     }
 
     /// Parameters of `nlmeans` and `nlmeans_radiance`.
-    NlMeansParams: block readonly 8 {
+    NlMeansParams: Block(access: "readonly", align: 8) {
         /// Image size, pixels.
         size: uvec2,
         /// Input: of each pixel its value and the variance of that, two floats; of radiance four.

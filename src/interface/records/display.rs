@@ -7,7 +7,7 @@ records! {
     };
 
     /// Parameters of the pass `display`.
-    DisplayParams: block readonly 8 {
+    DisplayParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// 256 floats: the smallest linear value that sRGB encodes as each byte.

@@ -4,7 +4,7 @@ records! {
     "film";
 
     /// A pixel of a film of one channel.
-    ScalarFilmPixel: array ScalarFilm readwrite 8 {
+    ScalarFilmPixel: Array(buffer: "ScalarFilm", access: "", align: 8) {
         /// Sum of the samples, and its compensation term.
         sum: vec2[1],
         /// Sum of the squared samples, and its compensation term.
@@ -16,7 +16,7 @@ records! {
     }
 
     /// A pixel of a film of linear RGB.
-    RgbFilmPixel: array RgbFilm readwrite 8 {
+    RgbFilmPixel: Array(buffer: "RgbFilm", access: "", align: 8) {
         /// Sum of the samples of each channel, and its compensation term.
         sum: vec2[3],
         /// Sum of the squared samples of each channel, and its compensation term.

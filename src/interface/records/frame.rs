@@ -37,7 +37,7 @@ records! {
 
     /// Parameters that all passes of a frame share: the cameras of this frame and of the previous one, the sampling settings, and the G-buffer. Parameters of a
     /// single pass are in src/interface/records/passes.rs.
-    FrameParams: block readonly 16 {
+    FrameParams: Block(access: "readonly", align: 16) {
         /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
         /// World to camera, three rows.
@@ -103,7 +103,7 @@ records! {
     }
 
     /// An object that moved or deformed: a box around its bounds in the previous frame and in this one.
-    MovedRecord: array MovedRecords readonly 16 {
+    MovedRecord: Array(buffer: "MovedRecords", access: "readonly", align: 16) {
         /// Lower corner, world space relative to the scene's origin.
         lower: vec3,
         /// Fraction of the hemisphere part that the box covers which may have changed in this frame: distance moved over size, at most 1.
@@ -115,7 +115,7 @@ records! {
     }
 
     /// The surface point at a pixel's centre.
-    SurfaceRecord: words {
+    SurfaceRecord: Words {
         /// Position, world space relative to the scene's origin.
         position: vec3,
         /// Distance along the normal at which a ray must start to avoid self-intersection, scene units.

@@ -33,7 +33,7 @@ records! {
     };
 
     /// A node or a leaf of the wide BVH before its kind is known: one cache line, 64 bytes.
-    Block: words {
+    Block: Words {
         /// Data of the node or leaf.
         body: uint[15],
         /// `LEAF` for a leaf; for a node the last four upper planes along z.
@@ -41,7 +41,7 @@ records! {
     }
 
     /// A node of the wide BVH: boxes of up to seven children, quantized to 8 bits per plane. The eighth byte of each `bytes8` holds other data.
-    WideNode: words {
+    WideNode: Words {
         /// Lower corner of the node.
         corner: vec3,
         /// Index of the first child's block; the others follow in slot order.
@@ -61,7 +61,7 @@ records! {
     }
 
     /// A leaf of the wide BVH: one triangle, or two with a common edge.
-    TriangleLeaf: words {
+    TriangleLeaf: Words {
         /// Vertices, BLAS space: the triangles are (0, 1, 2) and (0, 2, 3).
         corners: vec3[4],
         /// Indices of the triangles in the BLAS, with flags; all ones: there is no second triangle.
@@ -73,7 +73,7 @@ records! {
     }
 
     /// A leaf of the wide BVH: a sphere.
-    SphereLeaf: words {
+    SphereLeaf: Words {
         /// Centre, BLAS space.
         center: vec3,
         /// Radius, BLAS space.
@@ -89,7 +89,7 @@ records! {
     }
 
     /// A leaf of the wide TLAS: an instance.
-    InstanceLeaf: words {
+    InstanceLeaf: Words {
         /// World to BLAS space, three rows.
         world_to_group: vec4[3],
         /// Block of the root node of its BLAS.
@@ -103,7 +103,7 @@ records! {
     }
 
     /// An inner node of the binary BVH: boxes of both children, and references to them.
-    BinaryNode: words {
+    BinaryNode: Words {
         /// Lower and upper corner of both children.
         boxes: vec3[2][2],
         /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node with the axis of its own children in
@@ -114,7 +114,7 @@ records! {
     }
 
     /// A triangle of the binary BVH and `brute` kernels.
-    TriangleRecord: words {
+    TriangleRecord: Words {
         /// Vertices, BLAS space.
         corners: vec3[3],
         /// Index in the BLAS, with flags.
@@ -122,7 +122,7 @@ records! {
     }
 
     /// A sphere of the binary BVH and `brute` kernels, of the size of a `TriangleRecord`.
-    SphereRecord: words {
+    SphereRecord: Words {
         /// Centre, BLAS space.
         center: vec3,
         /// Radius, BLAS space.
@@ -134,7 +134,7 @@ records! {
     }
 
     /// A closest hit between the steps of a launch. For a miss only `t` is written.
-    LaunchHit: words {
+    LaunchHit: Words {
         /// Ray parameter; infinite for a miss.
         t: float,
         /// Index of the TLAS instance.

@@ -9,7 +9,7 @@ records! {
     };
 
     /// Parameters of Larsen's pipeline.
-    LarsenParams: block readonly 16 {
+    LarsenParams: Block(access: "readonly", align: 16) {
         /// Address of the `FrameParams`.
         frame: address,
         /// 4 floats per point light: position relative to the scene's origin, and padding.

@@ -27,7 +27,7 @@ records! {
     };
 
     /// A light of the scene.
-    LightRecord: array LightRecords readonly 16 {
+    LightRecord: Array(buffer: "LightRecords", access: "readonly", align: 16) {
         /// Lights from a position: that; triangle, rectangle, portal: a corner; sphere: centre. World space.
         position: vec3,
         /// Sphere: radius; directional: 1 - cosine of half its angular diameter.
@@ -65,7 +65,7 @@ records! {
 
     /// A node of the light tree: emission bounds of the lights below it. They lie in a bounding sphere, their normals within an angle o of an axis, and emission
     /// ends at an angle e beyond that.
-    LightNode: array LightNodes readonly 16 {
+    LightNode: Array(buffer: "LightNodes", access: "readonly", align: 16) {
         /// Centre of the bounding sphere.
         center: vec3,
         /// Radius of the bounding sphere, scene units.

@@ -12,7 +12,6 @@ pub mod larsen;
 pub mod lights;
 pub mod passes;
 pub mod path;
-pub mod path_options;
 pub mod queue;
 pub mod radiance;
 pub mod raster;
@@ -32,7 +31,7 @@ pub const FILES: [&File; 21] = [
     &shading::FILE,
     &block::FILE,
     &film::FILE,
-    &path_options::FILE,
+    &super::path_options::FILE,
     &lights::FILE,
     &path::FILE,
     &frame::FILE,

@@ -7,7 +7,7 @@ records! {
     };
 
     /// Parameters of `ao_trace`, and of `gather`, which averages its results.
-    AoTraceParams: block readonly 8 {
+    AoTraceParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Ambient visibility of each ray, a float: of the launch, or with a variance budget of the frame. Unused when each pixel has one ray.
@@ -30,7 +30,7 @@ records! {
     }
 
     /// Parameters of `gtao`.
-    GtaoParams: block readonly 8 {
+    GtaoParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Estimates of this frame, 8 bytes per pixel.
@@ -54,7 +54,7 @@ records! {
     }
 
     /// Parameters of `budget`.
-    BudgetParams: block readonly 8 {
+    BudgetParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// 8 bytes per pixel, in tile order: standard deviation of one sample, number of samples.
@@ -74,7 +74,7 @@ records! {
     }
 
     /// Parameters of `temporal`.
-    TemporalParams: block readonly 8 {
+    TemporalParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Estimates of this frame, 8 bytes per pixel.
@@ -102,7 +102,7 @@ records! {
     }
 
     /// Parameters of debug views.
-    DebugParams: block readonly 8 {
+    DebugParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Address of the `BlockParams` of the whole image.
@@ -118,7 +118,7 @@ records! {
     }
 
     /// Parameters of one step of a spatial filter (`filter`, `denoise`).
-    FilterParams: block readonly 8 {
+    FilterParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Input estimates.
@@ -146,7 +146,7 @@ records! {
     }
 
     /// Parameters of `resample`.
-    ResampleParams: block readonly 8 {
+    ResampleParams: Block(access: "readonly", align: 8) {
         /// Input records.
         from: address,
         /// Output records.
@@ -162,7 +162,7 @@ records! {
     }
 
     /// Parameters of `seen`.
-    SeenParams: block readonly 8 {
+    SeenParams: Block(access: "readonly", align: 8) {
         /// Address of a `FrameParams`: the G-buffer of this frame is the other image's, the previous frame is this image's last one.
         frame: address,
         /// Two `uint`: pixels of the other image that show a surface, and those of them whose surface this image shows as well.

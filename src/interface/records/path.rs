@@ -1,7 +1,7 @@
 //! Parameters of the path tracer's passes, and the state of each path.
 
+use super::super::path_options::PathOptionsRecord;
 use super::lights::LightRecord;
-use super::path_options::PathOptionsRecord;
 use super::queue::QueueRecord;
 
 records! {
@@ -19,7 +19,7 @@ records! {
     };
 
     /// An environment map in equirectangular projection.
-    EnvironmentRecord: structure {
+    EnvironmentRecord: Structure {
         /// A `vec4` per texel: linear radiance, and the weight for importance sampling; 0: the environment is constant.
         texels: address,
         /// Floats: the sampling table (path/map.glsl).
@@ -37,7 +37,7 @@ records! {
     }
 
     /// Parameters of the path tracer. They lie behind the `BlockParams` of its passes.
-    PathParams: block readonly 16 {
+    PathParams: Block(access: "readonly", align: 16) {
         /// The environment map.
         map: EnvironmentRecord,
         /// The light that is sampled, where there is but one.
@@ -137,7 +137,7 @@ records! {
 
     /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first
     /// one whose surface scatters light, which is seen directly or by mirrors and glass.
-    SignalRecord: words {
+    SignalRecord: Words {
         /// Emission and background seen directly, linear RGB.
         direct: vec3,
         /// 1 if the camera ray hit the scene.
@@ -157,7 +157,7 @@ records! {
     }
 
     /// The state of a path between two bounces.
-    PathRecord: words {
+    PathRecord: Words {
         /// Throughput, linear RGB.
         throughput: vec3,
         /// Probability density of BSDF sampling for the ray's direction; negative: no other technique could have sampled it, so it has no MIS weight.

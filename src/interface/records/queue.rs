@@ -4,7 +4,7 @@ records! {
     "queue";
 
     /// A queue of rays: part of the parameters of the passes that fill it and read its tags.
-    QueueRecord: structure {
+    QueueRecord: Structure {
         /// The `Ray`s, 32 bytes each.
         rays: address,
         /// A `uint` per ray, which the callback of the stream that traces the queue receives.

@@ -11,14 +11,14 @@ records! {
     };
 
     /// A ray of the G-buffer on its way behind mirrors and glass.
-    GuideRayRecord: words {
+    GuideRayRecord: Words {
         /// Rows of the product of reflections so far, each with a number besides: the distance from the camera in scene units, the number of bounces (bits of a
         /// `uint`), and 1 where the previous image did not show what the pixel does, else 0.
         rows: vec4[3],
     }
 
     /// What a pixel's ray hits, with the ids of the scene.
-    KnownHit: words {
+    KnownHit: Words {
         /// Ray parameter; infinite for a miss, which has no other fields.
         t: float,
         /// Index of the instance.
@@ -32,7 +32,7 @@ records! {
     }
 
     /// Parameters of `path_surface` and `path_reflection`, beside those of the block.
-    SurfacesParams: block readonly 8 {
+    SurfacesParams: Block(access: "readonly", align: 8) {
         /// The queue of rays behind mirrors and glass.
         next: QueueRecord,
         /// A `GuideRayRecord` per ray of the queue that is traced; 0: no ray goes on.
@@ -56,7 +56,7 @@ records! {
     }
 
     /// Parameters of `path_gather`.
-    GatherParams: block readonly 8 {
+    GatherParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Address of the `PathParams`, with what the paths of the launch left.
@@ -84,7 +84,7 @@ records! {
     }
 
     /// Parameters of `radiance_temporal`.
-    RadianceTemporalParams: block readonly 8 {
+    RadianceTemporalParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// This frame's samples, a `RadianceRecord` per pixel: diffuse reflection divided by the albedo.
@@ -120,7 +120,7 @@ records! {
     }
 
     /// Parameters of `compose`.
-    ComposeParams: block readonly 8 {
+    ComposeParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Diffuse reflection divided by the albedo, a `RadianceRecord` per pixel.
@@ -140,7 +140,7 @@ records! {
     }
 
     /// Parameters of `antialias`.
-    AntialiasParams: block readonly 16 {
+    AntialiasParams: Block(access: "readonly", align: 16) {
         /// From the space of the previous frame's camera to that of this one's, three rows.
         previous_to_camera: vec4[3],
         /// Address of the `FrameParams`.
@@ -196,7 +196,7 @@ records! {
     }
 
     /// Parameters of `rest_noise`.
-    RestNoiseParams: block readonly 8 {
+    RestNoiseParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Two `vec4` per pixel: samples since the image came to rest.
@@ -210,7 +210,7 @@ records! {
     }
 
     /// Parameters of `rest`.
-    RestParams: block readonly 8 {
+    RestParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Estimates of this frame, 8 bytes per pixel.
@@ -224,7 +224,7 @@ records! {
     }
 
     /// Parameters of `rest_samples`.
-    RestSamplesParams: block readonly 8 {
+    RestSamplesParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
         /// Ambient visibility of each sample of the launch, a float; negative where its camera ray missed.

@@ -4,7 +4,7 @@ records! {
     "raster";
 
     /// Parameters of rasterization.
-    RasterParams: block readonly 16 {
+    RasterParams: Block(access: "readonly", align: 16) {
         /// Eye-relative position to clip space, four rows.
         clip: vec4[4],
         /// Camera position, relative to the scene's origin.

@@ -9,7 +9,7 @@ records! {
     /// A ray: the points `origin + t * direction` with `tmin < t < tmax`. 32 bytes, the record of RAYS.bin. A ray with `tmax <= tmin` is inactive: it is not
     /// traced, and its callback reports a miss. The direction need not be of unit length; `t` is measured in units of it. Lengths are scene units (metres in
     /// glTF), relative to the scene's origin (`Scene::origin`).
-    Ray: structure {
+    Ray: Structure {
         /// Origin.
         origin: vec3,
         /// Exclusive lower bound of `t`, at least 0.
@@ -21,7 +21,7 @@ records! {
     }
 
     /// The result of tracing a ray. 20 bytes, the record of HITS.bin.
-    Hit: structure {
+    Hit: Structure {
         /// Ray parameter of the hit; infinite for a miss. Any-hit streams write 0 for an occluded ray.
         t: float,
         /// Index into the scene's instances; all ones for a miss.
@@ -35,7 +35,7 @@ records! {
     }
 
     /// The push constants of every stream and pass.
-    Push: push {
+    Push: Push {
         /// Address of the `SceneRoot` that is traced (`Tracer::scene_address`).
         scene: address,
         /// Address of the pass's own parameters.

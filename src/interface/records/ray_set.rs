@@ -4,7 +4,7 @@ records! {
     "ray_set";
 
     /// A set of rays and their results.
-    RaySet: block readonly 8 {
+    RaySet: Block(access: "readonly", align: 8) {
         /// The `Ray`s.
         rays: address,
         /// Closest: a `Hit` per ray, as in HITS.bin; any: a `uint` per ray, 1 = occluded.
@@ -12,7 +12,7 @@ records! {
     }
 
     /// Input and output buffers of a test shader.
-    Probe: block readonly 8 {
+    Probe: Block(access: "readonly", align: 8) {
         /// Input, as the shader declares it.
         inputs: address,
         /// Output, as the shader declares it.

@@ -10,7 +10,7 @@ records! {
     };
 
     /// The root of the scene: all other data is reached from here.
-    SceneRoot: block readonly 16 {
+    SceneRoot: Block(access: "readonly", align: 16) {
         /// `InstanceRecord` of each TLAS instance.
         instances: address,
         /// `SubmeshRecord` of each submesh of a BLAS.
@@ -58,7 +58,7 @@ records! {
     }
 
     /// A TLAS instance.
-    InstanceRecord: array InstanceRecords readonly 16 {
+    InstanceRecord: Array(buffer: "InstanceRecords", access: "readonly", align: 16) {
         /// BLAS space to world, three rows.
         group_to_world: vec4[3],
         /// World to BLAS space, three rows.
@@ -80,7 +80,7 @@ records! {
     }
 
     /// A submesh of a BLAS.
-    SubmeshRecord: array SubmeshRecords readonly 16 {
+    SubmeshRecord: Array(buffer: "SubmeshRecords", access: "readonly", align: 16) {
         /// 3 uints per triangle of the BLAS; 0 for spheres.
         indices: address,
         /// 3 floats per vertex of the BLAS; 4 per sphere: centre and radius.
@@ -114,7 +114,7 @@ records! {
     }
 
     /// The properties of a material that traversal needs: base colour and alpha.
-    MaterialRecord: array MaterialRecords readonly 16 {
+    MaterialRecord: Array(buffer: "MaterialRecords", access: "readonly", align: 16) {
         /// Base colour, linear RGB, and alpha.
         base_color: vec4,
         /// Transform of texture coordinates, 2x2, column by column.
@@ -136,7 +136,7 @@ records! {
     }
 
     /// A material's reference to a texture, with its transform (KHR_texture_transform).
-    TextureUse: structure {
+    TextureUse: Structure {
         /// Transform of texture coordinates, 2x2, column by column.
         transform: vec4,
         /// Added to the transformed texture coordinates.
@@ -148,7 +148,7 @@ records! {
     }
 
     /// A texture.
-    TextureRecord: array TextureRecords readonly 16 {
+    TextureRecord: Array(buffer: "TextureRecords", access: "readonly", align: 16) {
         /// RGBA texels, rows from the top.
         texels: address,
         /// Width in texels.
@@ -166,7 +166,7 @@ records! {
     }
 
     /// The mip levels of a texture above level 0.
-    MipRecord: array MipRecords readonly 8 {
+    MipRecord: Array(buffer: "MipRecords", access: "readonly", align: 8) {
         /// Texels of level 1, for each of `TEXELS_*`: a `uvec2` or a `vec4` per texel; 0: unused.
         texels: address[Texels::ALL.len()],
         /// Index of the smallest level.
@@ -176,7 +176,7 @@ records! {
     }
 
     /// A TLAS instance in the previous frame.
-    MotionRecord: array MotionRecords readonly 16 {
+    MotionRecord: Array(buffer: "MotionRecords", access: "readonly", align: 16) {
         /// BLAS space to world in the previous frame, three rows.
         previous_group_to_world: vec4[3],
         /// 3 floats per vertex of the BLAS: positions in the previous frame; 0: unchanged.

@@ -7,7 +7,7 @@ records! {
     "shading" includes "scene";
 
     /// A material for path tracing. Factors are linear.
-    ShadingRecord: array ShadingRecords readonly 16 {
+    ShadingRecord: Array(buffer: "ShadingRecords", access: "readonly", align: 16) {
         /// Emitted radiance, linear RGB.
         emission: vec3,
         /// One of `BSDF_*`; `BSDF_NONE` of unlit materials.

@@ -1,5 +1,5 @@
 //! Debug views: passes that write the displayed image themselves. They are compiled and run only for frames that show them, and no other pass reads what
-//! they write. Each is a file here and an entry of the list in src/interface/debug_views.rs.
+//! they write. Each is a file here and a variant of [`DisplayMode`], which [`super::debug_view`] brings together.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};

@@ -12,9 +12,11 @@ mod gbuffer;
 mod gtao;
 mod larsen;
 pub mod nlmeans;
+pub mod nodes;
 mod paths;
 mod radiance_filter;
 mod radiance_temporal;
+pub mod rejected;
 mod rest;
 mod rest_samples;
 mod surfaces;
@@ -33,7 +35,6 @@ use crate::film::block::{Block, TILE_PIXELS};
 use crate::integrators::path::PathOptions;
 use crate::integrators::path::signal::SignalPaths;
 use crate::interface::DisplayMode;
-use crate::interface::debug_views::debug_views;
 use crate::raster::Primary;
 use crate::scene::material::MaterialKind;
 use crate::shaders::{self, ComputeShader, StreamShaders};
@@ -43,20 +44,24 @@ use debug::DebugView;
 use paths::MAX_SAMPLES;
 use uncovered::Uncovered;
 
-macro_rules! debug_view_modules {
-    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
-        $(pub mod $module;)*
-
-        /// The debug view that a display mode selects, and its shader; `None` for buffers.
-        pub fn debug_view(mode: DisplayMode) -> Option<(&'static DebugView, &'static ComputeShader)> {
-            match mode {
-                $(DisplayMode::$view => Some((&$module::VIEW, &shaders::$shader)),)*
-                _ => None,
-            }
-        }
-    };
+/// The debug view that a display mode selects, and its shader; `None` for buffers.
+pub fn debug_view(mode: DisplayMode) -> Option<(&'static DebugView, &'static ComputeShader)> {
+    match mode {
+        DisplayMode::Nodes => Some((&nodes::VIEW, &shaders::NODES)),
+        DisplayMode::Rejected => Some((&rejected::VIEW, &shaders::REJECTED)),
+        DisplayMode::Result
+        | DisplayMode::Unfiltered
+        | DisplayMode::Samples
+        | DisplayMode::Variance
+        | DisplayMode::Depth
+        | DisplayMode::Rays
+        | DisplayMode::Normal
+        | DisplayMode::Position
+        | DisplayMode::Bent
+        | DisplayMode::Ids
+        | DisplayMode::Motion => None,
+    }
 }
-debug_views!(debug_view_modules);
 
 /// The streams that frames with these settings trace.
 pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
@@ -148,4 +153,17 @@ pub fn radiance_stages(
     stages.push(compose::stage(tracer, pixels, filtered, has_rest)?);
     stages.push(antialias::stage(tracer, pixels, Resource::Composed, has_rest)?);
     Ok(stages)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A view shows what its name says: its file, its shader and its mode are called the same.
+    #[test]
+    fn debug_views_have_shaders_of_their_names() {
+        let views = DisplayMode::ALL.into_iter().filter_map(|mode| Some((mode, debug_view(mode)?.1)));
+        let names: Vec<_> = views.map(|(mode, shader)| (mode.name(), shader.name)).collect();
+        assert_eq!(names, [("nodes", "nodes"), ("rejected", "rejected")]);
+    }
 }

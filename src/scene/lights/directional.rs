@@ -6,8 +6,14 @@ use super::keys::{Keys, degrees, direction};
 use super::{Emission, LightKind, LightType, PlacedLight};
 
 /// The type.
-pub const TYPE: LightType =
-    LightType { word: "sun", name: "directional", gltf: Some("directional"), strength: "irradiance", read };
+pub const TYPE: LightType = LightType {
+    word: "sun",
+    name: "directional",
+    gltf: Some("directional"),
+    strength: "irradiance",
+    keys: "direction, irradiance (lux), angle (its diameter in degrees)",
+    read,
+};
 
 fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
     let angle = keys.or("angle", 0.0, degrees(0.0..=180.0))? as f32;

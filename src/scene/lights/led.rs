@@ -1,5 +1,6 @@
-//! Lights at a position whose intensity is a power of the cosine of the angle from an axis, as data sheets describe LEDs and downlights: by the angle at which it
-//! is half. An angle of 60 degrees is a small Lambertian emitter; a beam angle is twice that angle.
+//! Lights at a position whose intensity is a power of the cosine of the angle from an axis, as data
+//! sheets describe LEDs and downlights: by the angle at which it is half. An angle of 60 degrees is
+//! a small Lambertian emitter; a beam angle is twice that angle.
 
 use std::f64::consts::{FRAC_PI_2, LN_2};
 
@@ -7,7 +8,14 @@ use super::keys::{Keys, degrees, direction, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
 
 /// The type.
-pub const TYPE: LightType = LightType { word: "led", name: "LED", gltf: None, strength: "intensity", read };
+pub const TYPE: LightType = LightType {
+    word: "led",
+    name: "LED",
+    gltf: None,
+    strength: "intensity",
+    keys: "position, direction, intensity (cd), half_angle (degrees from the axis where it is half)",
+    read,
+};
 
 fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
     let half_angle = keys.or("half_angle", 60f64.to_radians(), degrees(1.0..=89.0))? as f32;

@@ -1,11 +1,14 @@
-//! The types of lights that no surface emits ([`LightKind`]): a file here, and an entry of the list in src/interface/light_types.rs.
+//! The types of lights that no surface emits ([`LightKind`]), a file each.
 
+pub mod directional;
 pub mod keys;
+pub mod led;
+pub mod point;
+pub mod spot;
 
 use glam::DVec3;
 
 use crate::interface::LightKind as Number;
-use crate::interface::light_types::light_types;
 use keys::Keys;
 
 /// What a type of light declares.
@@ -14,10 +17,13 @@ pub struct LightType {
     pub word: &'static str,
     /// Its name in inventories and messages.
     pub name: &'static str,
-    /// Its type in KHR_lights_punctual, if that has it. Renderers that are compared with have the same ones.
+    /// Its type in KHR_lights_punctual, if that has it. Renderers that are compared with have the
+    /// same ones.
     pub gltf: Option<&'static str>,
     /// Key of its strength for `--light`, which says the unit.
     pub strength: &'static str,
+    /// Its keys for `--light`, with their units, as help lists them.
+    pub keys: &'static str,
     /// Takes from the keys of `--light` what the light is besides its strength and colour.
     pub read: fn(&mut Keys) -> Result<PlacedLight, String>,
 }
@@ -52,51 +58,84 @@ pub enum Emission {
     },
 }
 
-macro_rules! light_kind {
-    ($(
-        $(#[doc = $doc:literal])+
-        $variant:ident $({ $($(#[doc = $about:literal])+ $field:ident: $type:ty,)+ })? = mod $module:ident, $flag:literal, $label:literal, help($help:literal);
-    )*) => {
-        $(pub mod $module;)*
-
-        /// Type of a light. Area lights are emissive surfaces ([`Material::emissive`](crate::scene::Material::emissive)).
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum LightKind {
-            $($(#[doc = $doc])+ $variant $({ $($(#[doc = $about])+ $field: $type,)+ })?,)*
-        }
-
-        impl LightKind {
-            /// What the types declare.
-            pub const TYPES: &'static [&'static LightType] = &[$(&$module::TYPE,)*];
-
-            /// What its type declares.
-            pub fn about(self) -> &'static LightType {
-                match self {
-                    $(Self::$variant { .. } => &$module::TYPE,)*
-                }
-            }
-
-            /// What it is called in the shaders.
-            pub fn number(self) -> Number {
-                match self {
-                    $(Self::$variant { .. } => Number::$variant,)*
-                }
-            }
-
-            /// How it emits.
-            pub fn emission(self) -> Emission {
-                match self {
-                    $(Self::$variant $({ $($field),+ })? => $module::emission($($($field),+)?),)*
-                }
-            }
-        }
-    };
+/// Type of a light. Area lights are emissive surfaces
+/// ([`Material::emissive`](crate::scene::Material::emissive)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// `intensity` in lux, on a surface that faces the light.
+    Directional {
+        /// Angular diameter in radians; 0 for sharp shadows. The sun has 0.0093.
+        angle: f32,
+    },
+    /// `intensity` in candela.
+    Point,
+    /// `intensity` in candela along the axis.
+    Spot {
+        /// Angle from the axis at which the falloff starts, in radians.
+        inner_angle: f32,
+        /// Angle from the axis at which the falloff ends, in radians.
+        outer_angle: f32,
+    },
+    /// `intensity` in candela along the axis; beside it falls off as a power of the cosine, to
+    /// nothing at 90 degrees.
+    Led {
+        /// Angle from the axis at which the intensity is half of that, in radians, 1 to 89 degrees.
+        half_angle: f32,
+    },
 }
-light_types!(light_kind);
+
+impl LightKind {
+    /// What the types declare.
+    pub const TYPES: &'static [&'static LightType] = &[&directional::TYPE, &point::TYPE, &spot::TYPE, &led::TYPE];
+
+    /// What its type declares.
+    pub fn about(self) -> &'static LightType {
+        match self {
+            Self::Directional { .. } => &directional::TYPE,
+            Self::Point => &point::TYPE,
+            Self::Spot { .. } => &spot::TYPE,
+            Self::Led { .. } => &led::TYPE,
+        }
+    }
+
+    /// Its number in shaders.
+    pub fn number(self) -> Number {
+        match self {
+            Self::Directional { .. } => Number::Directional,
+            Self::Point => Number::Point,
+            Self::Spot { .. } => Number::Spot,
+            Self::Led { .. } => Number::Led,
+        }
+    }
+
+    /// How it emits.
+    pub fn emission(self) -> Emission {
+        match self {
+            Self::Directional { angle } => directional::emission(angle),
+            Self::Point => point::emission(),
+            Self::Spot { inner_angle, outer_angle } => spot::emission(inner_angle, outer_angle),
+            Self::Led { half_angle } => led::emission(half_angle),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The compiler holds all but the list to the variants.
+    #[test]
+    fn every_type_is_listed() {
+        // rectangles, triangles, spheres, the environment and portals are no types
+        assert_eq!(LightKind::TYPES.len() + 5, Number::ALL.len());
+        for light in LightKind::TYPES {
+            let given = vec![("position", "0,1,0"), ("direction", "0,-1,0")];
+            let kind = (light.read)(&mut Keys::new(light.word, given)).unwrap().kind;
+            assert_eq!(kind.about().word, light.word);
+            assert!(Number::ALL[5..].contains(&kind.number()));
+            assert!(light.keys.contains(light.strength), "{}: {}", light.word, light.keys);
+        }
+    }
 
     #[test]
     fn words_and_names_tell_types_apart() {

@@ -8,7 +8,14 @@ use super::keys::{Keys, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
 
 /// The type.
-pub const TYPE: LightType = LightType { word: "point", name: "point", gltf: Some("point"), strength: "intensity", read };
+pub const TYPE: LightType = LightType {
+    word: "point",
+    name: "point",
+    gltf: Some("point"),
+    strength: "intensity",
+    keys: "position, intensity (cd)",
+    read,
+};
 
 fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
     Ok(PlacedLight { kind: LightKind::Point, position: keys.needed("position", position)?, direction: DVec3::NEG_Z })

@@ -6,7 +6,14 @@ use super::keys::{Keys, degrees, direction, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
 
 /// The type.
-pub const TYPE: LightType = LightType { word: "spot", name: "spot", gltf: Some("spot"), strength: "intensity", read };
+pub const TYPE: LightType = LightType {
+    word: "spot",
+    name: "spot",
+    gltf: Some("spot"),
+    strength: "intensity",
+    keys: "position, direction, intensity (cd), outer, inner (degrees from the axis)",
+    read,
+};
 
 fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
     let outer = keys.or("outer", FRAC_PI_4, degrees(0.0..=90.0))?;

@@ -7,12 +7,12 @@ use crate::interface::constants;
 use crate::shaders;
 
 /// Shaders of every kind: large and small, with loops, switches, calls, and of every stage.
-fn shaders() -> Vec<&'static shaders::Shader> {
+fn shaders() -> Vec<shaders::Shader> {
     use shaders::*;
     let streams = [&AO_TRACE_ANY, &PATH_BOUNCE_CLOSEST, &PATH_CAMERA_CLOSEST, &RAYS_ANY, &RAYS_CLOSEST];
-    let of_streams = streams.into_iter().flat_map(|s| Variant::ALL.into_iter().filter_map(|v| s.variant(v)));
+    let of_streams = streams.into_iter().flat_map(|s| s.variants());
     let compute = [&ANTIALIAS, &FILTER, &GTAO, &PATH_RESOLVE, &TEMPORAL, &RADIANCE_TEMPORAL].map(|c| c.variant(true));
-    let stages = [&MISS, &TRIANGLE_CLOSEST, &TRIANGLE_ANY, &SPHERE_INTERSECTION, &DRAW_TRIANGLES, &DRAW_ALPHA, &DRAW_SPHERE];
+    let stages = [MISS, TRIANGLE_CLOSEST, TRIANGLE_ANY, SPHERE_INTERSECTION, DRAW_TRIANGLES, DRAW_ALPHA, DRAW_SPHERE];
     let kernels = [wide_kernel(Mode::Any, true), wide_kernel(Mode::Closest, false)];
     of_streams.chain(compute).chain(stages).chain(kernels).collect()
 }

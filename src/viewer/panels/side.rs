@@ -257,7 +257,9 @@ fn frames(app: &mut App, ui: &mut Ui) {
 
 fn paths(app: &mut App, ui: &mut Ui) {
     let integrator = match app.first {
-        Technique::Still(integrator) | Technique::Frames(integrator) if integrator.name() != "ao" => integrator.get(),
+        Technique::Still(integrator) | Technique::Frames(integrator) if !integrator.can(Capability::AmbientVisibility) => {
+            integrator.get()
+        }
         _ => {
             ui.label("For path, direct, lit, whitted and ao-sky.");
             &crate::integrators::path::kinds::PATH as &dyn Integrator
