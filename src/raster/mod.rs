@@ -49,7 +49,7 @@ choices! {
 
 /// Maximum number of instanced primitives per pixel at which rasterizing costs less than tracing: on CPU devices, and on others. Mesa's CPU driver takes 90 to
 /// 240 ns for a triangle, however small; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
-/// (`examples/primary.rs`). It was not measured on GPUs.
+/// (`benches/studies/primary.rs`). It was not measured on GPUs.
 const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
 
 impl Primary {

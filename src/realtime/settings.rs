@@ -142,7 +142,7 @@ impl GtaoConstants {
     /// The formula of Jimenez et al. (2016) as it stands: right where the image shows all occluders and steps are many.
     pub const FORMULA: Self =
         Self { radius_scale: 1.0, fade: 0.2, step_exponent: 2.0, thinness: 0.0, visibility_exponent: 1.0 };
-    /// Those of the presets, as `examples/tune_gtao.rs` fitted them.
+    /// Those of the presets, as `benches/studies/tune_gtao.rs` fitted them.
     pub const PRESETS: Self =
         Self { radius_scale: 2.0125, fade: 0.7625, step_exponent: 1.1875, thinness: 0.0, visibility_exponent: 1.375 };
 }

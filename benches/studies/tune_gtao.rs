@@ -72,7 +72,7 @@ fn main() -> Result<()> {
 fn arguments() -> Result<Arguments> {
     let words = |list: &[&str]| list.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
     let mut out = Arguments { size: [240, 136], rays: 256, views: 2, scenes: Vec::new(), checks: Vec::new() };
-    let wrong = |text: &str| Error::Usage(format!("{text}: see the head of examples/tune_gtao.rs"));
+    let wrong = |text: &str| Error::Usage(format!("{text}: see the head of benches/studies/tune_gtao.rs"));
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
         let mut value = || args.next().ok_or_else(|| wrong(&arg));
