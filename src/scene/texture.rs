@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use glam::Vec2;
+use glam::{DVec2, Vec2, Vec4};
 
 use crate::colour::srgb_decode;
 pub use crate::interface::Wrap;
@@ -132,12 +132,29 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Index of the texel that a point lies in. `uv`: any texture coordinates, v down.
-    pub fn texel_at(&self, uv: Vec2) -> usize {
-        let along = |u: f32, size: u32, wrap: Wrap| {
+    /// Linear colour and alpha at a point, interpolated by the texture's filter; its texels must not be empty.
+    /// `uv`: any texture coordinates, v down. The texels are sRGB.
+    pub fn look_up_srgb(&self, uv: Vec2) -> Vec4 {
+        let texel = |i: i64, j: i64| Vec4::from_array(self.texels.decode_srgb(self.texel_index(i, j)));
+        // the casts saturate; NaN becomes 0
+        let point = uv.as_dvec2() * DVec2::new(f64::from(self.width), f64::from(self.height));
+        if self.filter == Filter::Nearest || !point.is_finite() {
+            return texel(point.x.floor() as i64, point.y.floor() as i64);
+        }
+
+        // the four texels whose centres are around the point
+        let corner = (point - 0.5).floor();
+        let t = (point - 0.5 - corner).as_vec2();
+        let (i, j) = (corner.x as i64, corner.y as i64);
+        let (next_i, next_j) = (i.saturating_add(1), j.saturating_add(1));
+        let row = |j: i64| texel(i, j).lerp(texel(next_i, j), t.x);
+        row(j).lerp(row(next_j), t.y)
+    }
+
+    /// Index of the texel in column `i` and row `j`, which may lie outside the image: they are wrapped.
+    fn texel_index(&self, i: i64, j: i64) -> usize {
+        let inside = |i: i64, size: u32, wrap: Wrap| {
             let n = i64::from(size.max(1));
-            // the cast saturates; NaN becomes 0
-            let i = (f64::from(u) * n as f64).floor() as i64;
             let inside = match wrap {
                 Wrap::Repeat => i.rem_euclid(n),
                 Wrap::Clamp => i.clamp(0, n - 1),
@@ -148,6 +165,40 @@ impl Texture {
             };
             inside as usize
         };
-        along(uv.y, self.height, self.wrap[1]) * self.width as usize + along(uv.x, self.width, self.wrap[0])
+        inside(j, self.height, self.wrap[1]) * self.width as usize + inside(i, self.width, self.wrap[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Black and white texels, side by side.
+    fn black_and_white(filter: Filter, wrap: Wrap) -> Texture {
+        let texels = vec![0, 0, 0, 255, 255, 255, 255, 255].into();
+        Texture { name: String::new(), width: 2, height: 1, texels, wrap: [wrap; 2], filter }
+    }
+
+    #[test]
+    fn textures_are_interpolated_and_wrapped() {
+        let red = |filter, wrap, u| black_and_white(filter, wrap).look_up_srgb(Vec2::new(u, 0.3)).x;
+        for (u, nearest) in [(0.1, 0.0), (0.6, 1.0), (-0.1, 1.0), (1.2, 0.0)] {
+            assert_eq!(red(Filter::Nearest, Wrap::Repeat, u), nearest, "{u}");
+        }
+        // centres of texels are at a quarter and three quarters
+        for (wrap, u, linear) in [
+            (Wrap::Repeat, 0.25, 0.0),
+            (Wrap::Repeat, 0.5, 0.5),
+            (Wrap::Repeat, 0.0, 0.5),
+            (Wrap::Clamp, 0.0, 0.0),
+            (Wrap::Clamp, 7.0, 1.0),
+            (Wrap::Mirror, 1.0, 1.0),
+            (Wrap::Mirror, 1.5, 0.5),
+            (Wrap::Clamp, f32::NAN, 0.0),
+        ] {
+            let value = red(Filter::Linear, wrap, u);
+            assert!((value - linear).abs() < 1e-6, "{wrap:?} at {u}: {value}");
+        }
+        assert_eq!(black_and_white(Filter::Linear, Wrap::Clamp).look_up_srgb(Vec2::INFINITY).w, 1.0);
     }
 }

@@ -1,7 +1,7 @@
 //! Triangles whose radiance a texture says. Each is sampled as many lights, its *parts*, so that samples go where the picture is bright: the light tree chooses among
 //! parts as among other lights, and shaders find the part that a ray hits by its barycentrics (`part_at` of shaders/lights/triangle.glsl).
 
-use glam::{DVec2, Vec3, Vec4};
+use glam::{DVec2, Vec3};
 
 use super::brightness;
 use crate::interface::records::lights::{LIGHT_COLUMN_AT, LIGHT_ROW_AT, LIGHT_SIDE_AT, LIGHT_TURNED};
@@ -85,8 +85,7 @@ impl<'s> Picture<'s> {
             let points = grid(POINTS).map(|p| p.in_whole(DVec2::splat(1.0 / 3.0)));
             for at in points {
                 let at = part.in_whole(at).as_vec2();
-                let texel = self.texture.texel_at(a + at.x * (b - a) + at.y * (c - a));
-                sum += Vec4::from_array(self.texture.texels.decode_srgb(texel)).truncate();
+                sum += self.texture.look_up_srgb(a + at.x * (b - a) + at.y * (c - a)).truncate();
             }
             part.brightness = brightness(self.emissive * sum / (POINTS * POINTS) as f32);
         }
