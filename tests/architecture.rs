@@ -36,7 +36,7 @@ const LAYERS: &[&[&str]] = &[
 ];
 
 /// Rooms and folders whose files are still in larger circles than `MAX_CIRCLE`.
-const TIED: &[&str] = &["src/bench", "src/realtime"];
+const TIED: &[&str] = &["src/bench"];
 
 /// No circle of files has more of them than this.
 const MAX_CIRCLE: usize = 4;

@@ -1,4 +1,5 @@
-//! `budget`: distributes a frame's occlusion rays over pixels by their standard errors, in four stages.
+//! `budget`: distributes a frame's occlusion rays over pixels by their standard errors, in four
+//! stages.
 
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use crate::interface::BudgetStage;
 use crate::interface::records::frame::BUDGET_SHARE;
 use crate::interface::records::passes::BudgetParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::{self, LANES};
 use crate::tracer::Tracer;
