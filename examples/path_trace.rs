@@ -13,8 +13,7 @@ pub fn render(scene: &str, image: &Path) -> skylit::Result<StillReport> {
     let mut renderer = Renderer::open(scene, &DeviceSettings::default())?;
 
     // the same settings as the options of `skylit render`
-    let mut settings = RenderSettings::default();
-    settings.integrator = Some("path".parse()?);
+    let mut settings = RenderSettings { integrator: Some("path".parse()?), ..RenderSettings::default() };
     settings.image.size = Some([320, 180]);
     settings.image.spp = Some(16);
     settings.lighting.environment = Some("0.8,0.9,1.0".to_owned());

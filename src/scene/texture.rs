@@ -175,7 +175,7 @@ mod tests {
 
     /// Black and white texels, side by side.
     fn black_and_white(filter: Filter, wrap: Wrap) -> Texture {
-        let texels = vec![0, 0, 0, 255, 255, 255, 255, 255].into();
+        let texels = vec![0u8, 0, 0, 255, 255, 255, 255, 255].into();
         Texture { name: String::new(), width: 2, height: 1, texels, wrap: [wrap; 2], filter }
     }
 
