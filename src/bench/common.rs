@@ -8,11 +8,8 @@ use clap::{Args, ValueHint};
 use serde::Serialize;
 
 use super::baseline::BaselineReport;
-use super::page;
-use super::plot;
-use super::plot::picture::{self, PlotFormat};
-use super::record::{BenchKind, BenchRecord};
-use super::report::ReportedRecord;
+use super::page::{self, ReportedRecord};
+use super::record::Record;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
@@ -54,7 +51,7 @@ pub struct OutputArgs {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
     pub json: Option<Option<PathBuf>>,
     /// Also plot the results
-    #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.svg", value_hint = ValueHint::FilePath)]
     pub plot: Option<PathBuf>,
     /// Write a report into this folder: a page that needs no network, with charts, tables, host and notes
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -98,7 +95,7 @@ impl OutputArgs {
     }
 
     fn check_writable(&self, plan: &mut FilePlan) -> Result<()> {
-        self.plot.as_ref().map_or(Ok(()), |path| PlotFormat::of(path).map(drop))?;
+        self.plot.as_ref().map_or(Ok(()), |path| report::check_svg_name("--plot", path))?;
         self.html.as_ref().map_or(Ok(()), |dir| plan.make_folder(dir))?;
         self.json_file().into_iter().chain(&self.plot).try_for_each(|path| files::check_writable(path))
     }
@@ -117,9 +114,9 @@ impl OutputArgs {
     /// Writes the plot and the page of records, if they are asked for; a plot that cannot be written does not prevent the page. Returns the address of the page.
     ///
     /// # Errors
-    /// Those of [`picture::write`] and of [`report::write`], the first of them.
+    /// Those of [`page::write_plot`] and of [`report::write`], the first of them.
     pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
-        let plot = self.plot.as_ref().map_or(Ok(()), |path| picture::write(path, &plot::of_all(records)));
+        let plot = self.plot.as_ref().map_or(Ok(()), |path| page::write_plot(path, records));
         let write =
             |dir: &PathBuf| report::write(dir, &page::page(records, &command_line())).map(|index| report::address(&index));
         let address = self.html.as_ref().map(write).transpose();
@@ -127,14 +124,23 @@ impl OutputArgs {
     }
 }
 
-/// A record as JSON: with the benchmark that it is of, and how it compares with its baseline.
+/// Prints the address of a page, if one was written. Returns it, and what went wrong.
+pub fn show_address(pictures: Result<Option<String>>, console: Console) -> (Option<String>, Result<()>) {
+    match pictures {
+        Ok(address) => {
+            let shown = address.as_ref().map_or(Ok(()), |a| console.line(&format!("report: {a}")));
+            (address, shown)
+        }
+        Err(e) => (None, Err(e)),
+    }
+}
+
+/// A record as JSON, with how it compares with its baseline.
 #[derive(Serialize)]
-pub struct JsonRecord<'a, R> {
-    /// Which benchmark.
-    pub benchmark: BenchKind,
+pub struct JsonRecord<'a> {
     /// What was measured.
     #[serde(flatten)]
-    pub record: &'a R,
+    pub record: &'a Record,
     /// The comparison with an earlier record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<&'a BaselineReport>,
@@ -189,7 +195,7 @@ impl CommonArgs {
     ///
     /// # Errors
     /// The first error.
-    pub fn write_tables<R: BenchRecord>(&self, json: &JsonRecord<R>) -> Result<()> {
+    pub fn write_tables(&self, json: &JsonRecord) -> Result<()> {
         let write_csv = |path: &Path| {
             let mut text = Vec::new();
             json.record.write_csv(&mut text).map_err(|e| Error::write(path, &std::io::Error::other(e)))?;

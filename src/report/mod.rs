@@ -23,11 +23,13 @@ mod images;
 pub mod labels;
 mod layout;
 mod page;
+mod svg;
 mod table;
 
 pub use chart::{Axis, Chart, Mark, Point, Scale, Series};
 pub use images::{ComparedImage, ImageComparison};
 pub use page::{address, write};
+pub use svg::{check_svg_name, write_svg};
 pub use table::{Cell, Column, Row, Status, Table, format_number};
 
 /// A page of a report.

@@ -1,7 +1,8 @@
 //! When a result is worse than an earlier one beyond noise.
 
-use super::super::record::snapshot::{Measurement, Values};
-use super::Change;
+use serde::Serialize;
+
+use crate::bench::record::{Better, Measurement, Values};
 
 /// Least change that counts, as a share of the baseline: builds that differ in nothing but the addresses of their code differ by a few per cent.
 const MIN_CHANGE: f64 = 0.05;
@@ -25,11 +26,28 @@ pub enum Judgement {
     Unknown,
 }
 
+/// A result that changed beyond noise.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// What it was measured of.
+    pub row: String,
+    /// Quantity and unit.
+    pub quantity: String,
+    /// Median of the baseline.
+    pub before: f64,
+    /// Median of this run.
+    pub now: f64,
+    /// How much worse it is, as a share of the baseline; negative where it is better.
+    pub worse_by: f64,
+    /// How much would still be noise.
+    pub noise: f64,
+}
+
 /// Judges a result by an earlier one.
 pub fn judge(before: &Measurement, now: &Measurement) -> (Judgement, Change) {
     let (a, b) = (before.values.middle(), now.values.middle());
     // positive where it is worse
-    let worse = if now.more_is_better { a - b } else { b - a };
+    let worse = if now.better == Better::More { a - b } else { b - a };
     let noise = noise(&before.values, &now.values).map(|n| n.max(MIN_CHANGE * a.abs()));
     let share = |x: f64| {
         if a == 0.0 && x != 0.0 {
@@ -41,8 +59,8 @@ pub fn judge(before: &Measurement, now: &Measurement) -> (Judgement, Change) {
         }
     };
     let change = Change {
-        row: now.row.clone(),
-        quantity: now.quantity,
+        row: now.row(),
+        quantity: now.title(),
         before: a,
         now: b,
         worse_by: share(worse),
@@ -82,7 +100,10 @@ mod tests {
     use crate::measure::stats::Percentiles;
 
     fn measured(values: Values, more_is_better: bool) -> Measurement {
-        Measurement { row: "r".into(), quantity: "q", values, more_is_better, is_peers: false }
+        let better = if more_is_better { Better::More } else { Better::Less };
+        let [scene, part, contestant, unit] = [const { String::new() }; 4];
+        let quantity = "q".into();
+        Measurement { scene, part, contestant, at: None, quantity, unit, better, is_peers: false, values }
     }
 
     fn repeated(values: &[f64]) -> Values {

@@ -4,13 +4,16 @@ use std::time::Instant;
 
 use glam::DMat3;
 
-use super::args::BenchFramesArgs;
+use super::args::{BenchFramesArgs, FalloffChoice};
+use super::candidates::{Candidate, Occlusion};
+use super::frame_log::TypicalFrame;
 use crate::accel::flatten::FlatScene;
-use crate::bench::frame_log::TypicalFrame;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
 use crate::measure::stats::median;
+use crate::raster::Primary;
+use crate::realtime::frame_settings::Antialias;
 use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
 use crate::renderer::RenderSettings;
 use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
@@ -31,18 +34,28 @@ pub const TIMED_PATHS: [u32; 2] = [1, 9];
 pub struct Signal {
     settings: RenderSettings,
     size: [u32; 2],
+    /// Of ambient occlusion.
+    occlusion: Option<Occlusion>,
 }
 
 impl Signal {
-    /// What the arguments ask for; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
-    pub fn new(args: &BenchFramesArgs, reach: f64, bounces: Option<u32>) -> Self {
-        let mut settings = RenderSettings { integrator: Some(args.integrator), ..RenderSettings::default() };
-        settings.image.size = Some(args.size());
+    /// What the arguments ask for, in an image of this size; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
+    ///
+    /// # Errors
+    /// Those of [`Occlusion::new`].
+    pub fn new(args: &BenchFramesArgs, size: [u32; 2], reach: f64, bounces: Option<u32>) -> Result<Self> {
+        let mut settings = RenderSettings { integrator: Some(args.integrator()), ..RenderSettings::default() };
+        settings.image.size = Some(size);
         settings.integrators.path.max_depth = bounces;
-        if args.integrator.get().capabilities().contains(&Capability::AmbientOcclusion) {
+        let mut occlusion = None;
+        if args.is_occlusion() {
+            // through the middles of pixels, which all presets can
+            settings.frames.antialias = Some(Antialias::Off);
+            occlusion = Some(Occlusion::new(reach, args.ao_falloff == FalloffChoice::Binary)?);
+        } else if args.integrator().get().capabilities().contains(&Capability::AmbientOcclusion) {
             settings.integrators.ao.ao_radius = Some(Length::Units(reach));
         }
-        Self { settings, size: args.size() }
+        Ok(Self { settings, size, occlusion })
     }
 
     /// Number of values per pixel.
@@ -50,7 +63,7 @@ impl Signal {
         if is_ambient_occlusion(self.settings.integrator()) { 1 } else { 3 }
     }
 
-    fn of(&self, preset: Preset) -> RenderSettings {
+    fn render_settings(&self, preset: Preset) -> RenderSettings {
         let mut settings = self.settings.clone();
         settings.frames.preset = Some(preset);
         settings
@@ -60,8 +73,17 @@ impl Signal {
     ///
     /// # Errors
     /// Those of [`frame_settings`].
-    pub fn frame_settings(&self, preset: Preset) -> Result<Settings> {
-        Ok(Settings { rest: false, ..frame_settings(&self.of(preset))? })
+    pub fn frame_settings(&self, candidate: &Candidate) -> Result<Settings> {
+        let mut render = self.render_settings(candidate.preset);
+        render.frames.technique = candidate.technique;
+        let settings = Settings { rest: false, ..frame_settings(&render)? };
+        Ok(self.occlusion.map_or(settings, |occlusion| occlusion.apply_to(settings)))
+    }
+
+    /// Settings of frames with the defaults of `render`.
+    fn default_settings(&self) -> Result<Settings> {
+        let settings = Settings { rest: false, ..frame_settings(&self.render_settings(Preset::Balanced))? };
+        Ok(self.occlusion.map_or(settings, |occlusion| occlusion.apply_to(settings)))
     }
 
     /// Scene data that a tracer needs for all of this.
@@ -69,7 +91,7 @@ impl Signal {
     /// # Errors
     /// Those of [`frame_settings`].
     pub fn needs(&self) -> Result<Needs> {
-        Ok(frame_needs(&self.settings, &self.frame_settings(Preset::Balanced)?))
+        Ok(frame_needs(&self.settings, &self.default_settings()?))
     }
 
     /// Streams that are traced.
@@ -77,10 +99,10 @@ impl Signal {
     /// # Errors
     /// Those of [`frame_settings`].
     pub fn streams(&self) -> Result<Vec<&'static StreamShaders>> {
-        Ok(frame_streams(&self.settings, &self.frame_settings(Preset::Balanced)?))
+        Ok(frame_streams(&self.settings, &self.default_settings()?))
     }
 
-    /// Makes frames of a preset, as `how` says, which is [`Signal::frame_settings`] of it or near it.
+    /// Makes frames of a preset with these settings, which are [`Signal::frame_settings`] of it or near them.
     ///
     /// # Errors
     /// Those of the device.
@@ -90,12 +112,12 @@ impl Signal {
         flat: &FlatScene,
         camera: &Camera,
         preset: Preset,
-        how: Settings,
+        frame: Settings,
     ) -> Result<Realtime> {
-        let settings = self.of(preset);
-        let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
-        let options = options.map(|options| PathOptions { seed: how.seed, ..options });
-        pipeline(tracer, flat, self.size, &how, options.as_ref())
+        let settings = self.render_settings(preset);
+        let options = frame_path_options(&settings, flat.scene, camera, self.size, &frame)?;
+        let options = options.map(|options| PathOptions { seed: frame.seed, ..options });
+        pipeline(tracer, flat, self.size, &frame, options.as_ref())
     }
 
     /// Makes images of independent samples.
@@ -103,15 +125,16 @@ impl Signal {
     /// # Errors
     /// Those of the device.
     pub fn sampler(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera) -> Result<Sampler> {
-        let how = self.frame_settings(Preset::Balanced)?;
-        Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &how)? {
+        let frame = self.default_settings()?;
+        Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &frame)? {
             Some(options) => {
                 let options = PathOptions { spp: MAX_PATHS, ..options };
                 Sampler::Paths { integrator: Box::new(PathIntegrator::new(tracer, flat, &options)?), options }
             }
             None => {
-                let filter = Filter { kind: FilterKind::None, ..how.filter };
-                Sampler::Rays { settings: Settings { history: 1, filter, ..how }, size: self.size }
+                let filter = Filter { kind: FilterKind::None, ..frame.filter };
+                let settings = Settings { history: 1, filter, primary: Some(Primary::Traced), ..frame };
+                Sampler::Rays { settings, size: self.size }
             }
         })
     }

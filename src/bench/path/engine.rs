@@ -89,6 +89,8 @@ impl<'a> Engine<'a> {
 
 /// A reference image.
 pub struct PathReference {
+    /// Who rendered it: skylit, or the name of a peer.
+    pub engine: String,
     /// Linear RGB, rows from the top.
     pub image: Vec<f32>,
     /// Standard error of `image`, root mean square over pixels and channels.
@@ -99,15 +101,15 @@ pub struct PathReference {
     pub seconds: f64,
 }
 
-/// Renders a reference for `limit` seconds. `advance` hears the share that is done.
+/// Renders the reference of an engine of this name for `limit` seconds. `advance` hears the share that is done.
 ///
 /// # Errors
 /// Those of [`Engine::render`].
 pub fn render_reference(
     engine: &mut Engine,
+    name: &str,
     peers: &mut [Peer],
-    limit: f64,
-    max_spp: u32,
+    (limit, max_spp): (f64, u32),
     advance: &mut dyn FnMut(f64),
 ) -> Result<PathReference, PeerError> {
     // how many paths take about a chunk's time
@@ -129,5 +131,6 @@ pub fn render_reference(
         advance((seconds / limit).min(1.0));
     }
     let rmse = halves.standard_error(3, None)?;
-    Ok(PathReference { image: halves.mean(), rmse, spp: u64::from(spp) * u64::from(chunks), seconds })
+    let spp = u64::from(spp) * u64::from(chunks);
+    Ok(PathReference { engine: name.to_owned(), image: halves.mean(), rmse, spp, seconds })
 }

@@ -5,6 +5,7 @@ use clap::{Args, ValueHint};
 use super::contestant::KERNELS;
 use super::streams::STREAMS;
 use crate::bench::common::CommonArgs;
+use crate::bench::session::Session;
 use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::BuildChoice;
@@ -66,6 +67,9 @@ pub struct BenchRaysArgs {
     #[command(flatten)]
     pub common: CommonArgs,
 }
+
+/// A run of `skylit bench rays`.
+pub type RaySession<'a> = Session<'a, BenchRaysArgs>;
 
 fn kernel_names() -> clap::builder::PossibleValuesParser {
     KERNELS.iter().map(|o| o.name).collect::<Vec<_>>().into()

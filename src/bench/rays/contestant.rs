@@ -4,7 +4,6 @@ use super::streams::{Set, sample};
 use crate::accel::flatten::FlatScene;
 use crate::bench::device::BenchDevice;
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::record::rays::BuildRecord;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::DeviceInfo;
@@ -68,12 +67,25 @@ enum Engine<'a> {
     Peer { peer: usize, kernel: String, flat: &'a FlatScene<'a> },
 }
 
+/// What building a contestant's hierarchy took.
+#[derive(Clone, Debug)]
+pub struct BuildCost {
+    /// Seconds to build the hierarchy.
+    pub seconds: f64,
+    /// Seconds to write the scene into device memory; `None` for peers.
+    pub upload_seconds: Option<f64>,
+    /// Bytes of nodes and primitives by stored primitive.
+    pub bytes_per_primitive: f64,
+    /// Cost of the hierarchy by the surface area heuristic, where it is known.
+    pub sah_cost: Option<f64>,
+}
+
 /// A contestant with a scene.
 pub struct Contestant<'a> {
     /// In tables.
     pub name: String,
     /// What building took.
-    pub build: BuildRecord,
+    pub build: BuildCost,
     /// Its answers have to agree with the reference.
     pub strict: bool,
     /// Which kernel of the compute tracer it is.
@@ -89,9 +101,8 @@ impl<'a> Contestant<'a> {
     pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
         let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
         let stats = tracer.stats();
-        let build = BuildRecord {
-            contestant: own.name.to_owned(),
-            build_seconds: stats.build_seconds,
+        let build = BuildCost {
+            seconds: stats.build_seconds,
             upload_seconds: Some(stats.upload_seconds),
             bytes_per_primitive: stats.bytes_per_primitive(),
             sah_cost: stats.sah_cost,
@@ -113,10 +124,9 @@ impl<'a> Contestant<'a> {
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
         let name = peer.spec.title_of(kernel);
-        let (build_seconds, bytes) = peer.build(kernel)?;
-        let build = BuildRecord {
-            contestant: name.clone(),
-            build_seconds,
+        let (seconds, bytes) = peer.build(kernel)?;
+        let build = BuildCost {
+            seconds,
             upload_seconds: None,
             bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
             sah_cost: None,

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::record::cost::{FrameCost, PassTime};
+use crate::bench::record::{Record, plain, quantity};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::measure::stats::Percentiles;
@@ -28,6 +28,73 @@ pub fn measured(frames: u32) -> Vec<u32> {
     at
 }
 
+/// Passes of a frame that trace and average samples.
+const SAMPLING: [&str; 6] = ["path_camera", "path_bounce", "path_shadow", "path_gather", "ao_trace", "gather"];
+
+/// Times of a pass, or of one step of several launches of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    /// Name of the pass.
+    pub pass: String,
+    /// Device time over the timed frames, milliseconds.
+    pub ms: Percentiles,
+}
+
+/// Cost of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameCost {
+    /// Each pass.
+    pub passes: Vec<PassTime>,
+    /// All passes, on the device; 0 where the device has no clock.
+    pub device_ms: Percentiles,
+    /// By the clock of the process, submission included.
+    pub wall_ms: Percentiles,
+    /// Camera rays, the mean of a frame.
+    pub camera_rays: f64,
+    /// Occlusion rays traced, the mean of a frame.
+    pub rays: f64,
+    /// Occlusion rays that were left out, the mean of a frame.
+    pub skipped_rays: f64,
+}
+
+impl FrameCost {
+    /// Time on the device, or by the clock where the device has none, milliseconds.
+    pub fn time(&self) -> Percentiles {
+        if self.device_ms.median > 0.0 { self.device_ms } else { self.wall_ms }
+    }
+
+    /// Median on the device, or by the clock where the device has none.
+    pub fn ms(&self) -> f64 {
+        self.time().median
+    }
+
+    /// Share of the device time that goes into passes that trace and average samples, rather than reuse those of earlier frames and of neighbours; `None` where it is
+    /// not known.
+    pub fn sampling_share(&self) -> Option<f64> {
+        let is_sampling = |p: &&PassTime| SAMPLING.contains(&p.pass.as_str());
+        let sampling: f64 = self.passes.iter().filter(is_sampling).map(|p| p.ms.median).sum();
+        let all: f64 = self.passes.iter().map(|p| p.ms.median).sum();
+        (sampling > 0.0).then(|| sampling / all)
+    }
+
+    /// Adds it to a record: time, rays, and the time of each pass as a part of its own.
+    pub fn add_to(&self, record: &mut Record, [scene, part, contestant]: [&str; 3]) {
+        let mut row = record.row(scene, part, contestant);
+        row.repeated(quantity::FRAME_TIME, self.time()).repeated(plain("wall time", "ms"), self.wall_ms);
+        row.exact(quantity::CAMERA_RAYS, self.camera_rays).exact(quantity::RAYS, self.rays);
+        row.exact(plain("skipped rays", ""), (self.skipped_rays > 0.0).then_some(self.skipped_rays));
+        let mut row = record.row(scene, &format!("{part}, passes"), contestant);
+        for pass in &self.passes {
+            row.repeated(plain(&pass.pass, "ms"), pass.ms);
+        }
+    }
+
+    /// Rays of a frame, those of the camera included.
+    pub fn all_rays(&self) -> f64 {
+        self.rays + self.camera_rays
+    }
+}
+
 /// Frames that were made.
 #[derive(Default)]
 pub struct FrameLog {
@@ -50,7 +117,7 @@ struct TimedFrame {
 
 impl FrameLog {
     /// Makes the next frame and takes its time. Fails when the user asked to stop.
-    pub fn frame(
+    pub fn render_frame(
         &mut self,
         realtime: &mut Realtime,
         tracer: &Tracer,
@@ -70,19 +137,14 @@ impl FrameLog {
         Ok(&self.frames[self.frames.len() - 1].stats)
     }
 
-    /// Frames so far.
-    pub fn len(&self) -> usize {
+    /// Number of frames so far.
+    pub fn count(&self) -> usize {
         self.frames.len()
     }
 
     /// Occlusion rays of all frames so far.
     pub fn rays(&self) -> u64 {
         self.frames.iter().map(|l| l.stats.occlusion_rays).sum()
-    }
-
-    /// Camera rays of all frames so far.
-    pub fn camera_rays(&self) -> u64 {
-        self.frames.iter().map(|l| l.stats.primary_rays).sum()
     }
 
     /// Device seconds of each frame, or by the clock where the device has none.
@@ -182,5 +244,16 @@ mod tests {
         assert_eq!(names, [("gbuffer", 1.5), ("filter", 0.25)]);
         assert!((cost.device_ms.median - 1.75).abs() < 1e-12 && (cost.device_ms.p95 - 3.5).abs() < 1e-12);
         assert_eq!((log.rays(), cost.rays), (40, 10.0));
+    }
+
+    #[test]
+    fn the_share_of_samples() {
+        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::of(&[ms]).unwrap() };
+        let cost = FrameCost {
+            passes: vec![pass("path_camera", 1.0), pass("path_bounce", 2.0), pass("filter", 1.0)],
+            ..FrameCost::default()
+        };
+        assert_eq!(cost.sampling_share(), Some(0.75));
+        assert_eq!(FrameCost::default().sampling_share(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! The presets that are compared, all with the same occlusion settings.
+//! The presets that are compared; those of ambient occlusion all with the same occlusion settings.
 
 use crate::error::{Error, Result};
 use crate::raster::Primary;
@@ -16,9 +16,10 @@ const THEIR_REACH: f64 = 100.0;
 pub struct Candidate {
     /// Name on the command line and in tables.
     pub name: &'static str,
-    preset: Preset,
+    /// Its settings.
+    pub preset: Preset,
     /// Overrides the preset's technique.
-    technique: Option<Technique>,
+    pub technique: Option<Technique>,
 }
 
 const fn preset(name: &'static str, preset: Preset) -> Candidate {
@@ -37,13 +38,14 @@ pub const CANDIDATES: [Candidate; 7] = [
 ];
 
 impl Candidate {
-    /// Its render settings with a scene's occlusion.
-    pub fn settings(&self, occlusion: &Occlusion) -> Settings {
-        let settings = self.preset.settings();
-        let technique = self.technique.unwrap_or(settings.technique);
-        // the pipeline of Larsen (2019) traces its camera rays
-        let primary = if technique == Technique::Larsen { Some(Primary::Traced) } else { settings.primary };
-        occlusion.of(Settings { technique, primary, ..settings })
+    /// The candidate of this name, if there is one.
+    pub fn find(name: &str) -> Option<&'static Self> {
+        CANDIDATES.iter().find(|c| c.name == name)
+    }
+
+    /// Whether it is for ambient occlusion alone.
+    pub fn is_for_occlusion_alone(&self) -> bool {
+        self.technique.is_some() || self.preset.settings().technique == Technique::Larsen
     }
 }
 
@@ -71,13 +73,16 @@ impl Occlusion {
         )))
     }
 
-    /// Settings with this occlusion. The length unit of the `larsen` pipeline is chosen so that its falloff, or its ray length, matches.
-    pub fn of(&self, settings: Settings) -> Settings {
-        let (radius, unit) = match self.binary {
-            true => (self.reach, self.reach / THEIR_REACH),
-            false => (f64::INFINITY, self.reach * THEIR_FALLOFF.ln() / -MIN_WEIGHT.ln()),
+    /// Settings with this occlusion. The length unit of the `larsen` pipeline, which traces its camera rays, is chosen so that its falloff, or its ray length, matches.
+    pub fn apply_to(&self, settings: Settings) -> Settings {
+        let (radius, unit) = if self.binary {
+            (self.reach, self.reach / THEIR_REACH)
+        } else {
+            (f64::INFINITY, self.reach * THEIR_FALLOFF.ln() / -MIN_WEIGHT.ln())
         };
-        Settings { radius, falloff: self.falloff, unit, ..settings }
+        let is_larsen = settings.technique == Technique::Larsen;
+        let primary = if is_larsen { Some(Primary::Traced) } else { settings.primary };
+        Settings { radius, falloff: self.falloff, unit, primary, ..settings }
     }
 }
 
@@ -88,14 +93,15 @@ mod tests {
     #[test]
     fn both_pipelines_fade_alike() {
         let occlusion = Occlusion::new(60.0, false).unwrap();
-        let s = CANDIDATES[0].settings(&occlusion);
+        let s = occlusion.apply_to(CANDIDATES[0].preset.settings());
         assert!((s.falloff.powf(-60.0) - MIN_WEIGHT).abs() < 1e-12);
         // theirs: 8 to the distance in units of its own
         assert!((THEIR_FALLOFF.powf(-60.0 / s.unit) - MIN_WEIGHT).abs() < 1e-12);
         assert!(s.technique == Technique::Larsen && (s.unit * 2.66 / 60.0 - 1.0).abs() < 0.01);
-        let binary = CANDIDATES[3].settings(&Occlusion::new(2.0, true).unwrap());
+        let binary = Occlusion::new(2.0, true).unwrap().apply_to(CANDIDATES[3].preset.settings());
         assert_eq!((binary.radius, binary.falloff, binary.unit), (2.0, 1.0, 0.02));
-        assert_eq!(CANDIDATES[5].settings(&occlusion).technique, Technique::Gtao);
+        assert_eq!(CANDIDATES[5].technique, Some(Technique::Gtao));
+        assert_eq!(s.primary, Some(Primary::Traced));
     }
 
     #[test]
