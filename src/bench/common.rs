@@ -101,9 +101,6 @@ impl OutputArgs {
     }
 
     /// Writes the JSON record, if a file is given for it.
-    ///
-    /// # Errors
-    /// [`Error::Output`].
     pub fn write_json(&self, value: &impl Serialize) -> Result<()> {
         let Some(path) = self.json_file() else { return Ok(()) };
         let text = serde_json::to_string_pretty(value)
@@ -112,9 +109,6 @@ impl OutputArgs {
     }
 
     /// Writes the plot and the page of records, if they are asked for; a plot that cannot be written does not prevent the page. Returns the address of the page.
-    ///
-    /// # Errors
-    /// Those of [`page::write_plot`] and of [`report::write`], the first of them.
     pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
         let plot = self.plot.as_ref().map_or(Ok(()), |path| page::write_plot(path, records));
         let write =
@@ -156,9 +150,6 @@ impl CommonArgs {
     }
 
     /// Checks the arguments before anything that takes long. The plan has made the folder of the report.
-    ///
-    /// # Errors
-    /// Those of [`OutputArgs::check`], for the CSV table too.
     pub fn check(&self) -> Result<FilePlan> {
         let mut plan = self.plan();
         plan.check()?;
@@ -192,9 +183,6 @@ impl CommonArgs {
     }
 
     /// Writes the JSON record and the CSV table, if they are asked for; one that cannot be written does not prevent the other.
-    ///
-    /// # Errors
-    /// The first error.
     pub fn write_tables(&self, json: &JsonRecord) -> Result<()> {
         let write_csv = |path: &Path| {
             let mut text = Vec::new();

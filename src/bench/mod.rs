@@ -27,9 +27,6 @@ pub use args::BenchArgs;
 use crate::terminal::console::Failure;
 
 /// Runs a benchmark, or reports what was measured.
-///
-/// # Errors
-/// Those of the benchmark; what was measured before is written all the same.
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     match &args.benchmark {
         args::Benchmark::Rays(args) => rays::run(args),

@@ -108,9 +108,6 @@ fn record_sections(record: &Record) -> Vec<Section> {
 }
 
 /// Writes all charts of records into one SVG.
-///
-/// # Errors
-/// Those of [`report::write_svg`].
 pub fn write_plot(path: &Path, reported: &[ReportedRecord]) -> Result<()> {
     let charts = |r: &ReportedRecord| -> Vec<Chart> {
         let scenes = table::scene_names(&r.record);

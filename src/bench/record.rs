@@ -357,9 +357,6 @@ impl Record {
     }
 
     /// Writes a row for each result. What is not known is empty.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record([

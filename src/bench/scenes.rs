@@ -166,9 +166,6 @@ impl SceneList {
 }
 
 /// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
-///
-/// # Errors
-/// Those of [`load::load`]; [`Error::Usage`] for a JSON file, which is no scene: whoever names one wants the record there.
 pub fn check_exists(source: &str) -> Result<()> {
     if Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
@@ -187,9 +184,6 @@ pub fn shared_folder() -> PathBuf {
 }
 
 /// An environment map with a sun: the one that is given, the shared one where it is there and `quick` is not wanted, or our own.
-///
-/// # Errors
-/// Those of [`load::load_environment`].
 pub fn sun_map(given: Option<&Path>, quick: bool) -> Result<EnvironmentMap> {
     let shared = shared_folder().join(SUN_MAP);
     match given {

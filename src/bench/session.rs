@@ -47,9 +47,6 @@ pub struct Session<'a, A> {
 
 impl<'a, A> Session<'a, A> {
     /// Opens the device. `record` makes the record that is filled: it has the settings already, which have to be those of the baseline.
-    ///
-    /// # Errors
-    /// Those of [`CommonArgs::check`], of [`Baseline::read`] and [`Baseline::check`], and of [`BenchDevice::open`].
     pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> Record) -> Result<Self> {
         let start = Instant::now();
         let plan = common.check()?;
@@ -77,9 +74,6 @@ impl<'a, A> Session<'a, A> {
     }
 
     /// Starts peers; those that do not start are left out with a note, and so are all where `specs` says why there are none.
-    ///
-    /// # Errors
-    /// Those of our own side; Ctrl-C.
     pub fn start_peers(&mut self, specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
         let specs = match specs {
             Ok(specs) => specs,
@@ -159,17 +153,11 @@ impl<'a, A> Session<'a, A> {
     }
 
     /// Shows what the run is of: host, settings and peers.
-    ///
-    /// # Errors
-    /// When stdout cannot be written.
     pub fn show_title(&self) -> Result<()> {
         self.show(&[table::title(&self.record)])
     }
 
     /// Shows what is known of a scene, if anything was measured of it.
-    ///
-    /// # Errors
-    /// When stdout cannot be written.
     pub fn show_scene(&self, scene: &str) -> Result<()> {
         let is_measured = self.record.measurements.iter().any(|m| m.scene == scene);
         if is_measured { self.show(&table::scene_lines(&self.record, scene)) } else { Ok(()) }
@@ -208,9 +196,6 @@ impl<'a, A> Session<'a, A> {
 
     /// Writes and prints what was measured, whatever went wrong, and compares it with the baseline. `scenes_named`: a scene that failed fails the run even if another one did
     /// not; `checked`: what follows from the record itself.
-    ///
-    /// # Errors
-    /// The first that went wrong.
     pub fn finish(self, measured: Result<()>, scenes_named: bool, checked: Result<()>) -> Result<(), Failure> {
         let Self { record, device, common, console, failure, control, peers, baseline, .. } = self;
         // before anything is printed

@@ -56,9 +56,6 @@ pub struct BaselineReport {
 
 impl Baseline {
     /// Reads an earlier record.
-    ///
-    /// # Errors
-    /// Those of [`Record::read`].
     pub fn read(path: &Path) -> Result<Self> {
         Ok(Self { path: path.to_owned(), before: Record::read(path)? })
     }

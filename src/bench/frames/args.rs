@@ -186,9 +186,6 @@ impl BenchFramesArgs {
     }
 
     /// Checks that the integrator has frames in real time, these presets, and what is varied.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
     pub fn check(&self) -> Result<()> {
         let name = self.integrator().name();
         if !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames) {

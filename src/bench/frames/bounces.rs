@@ -43,9 +43,6 @@ const QUICK: usize = 2;
 const FRAMES: u32 = 24;
 
 /// Measures all of them.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let args = session.args;
     let name = args.presets.first().map_or(OURS, String::as_str);

@@ -61,9 +61,6 @@ struct ChangeRun {
 }
 
 /// Measures all changes that the scene can have.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession, view: &View, stage: &mut Stage, mover: Option<Mover>) -> Result<()> {
     if let Some(map) = stage.map() {
         turn(session, &view.name, stage, map)?;

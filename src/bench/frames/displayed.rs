@@ -96,9 +96,6 @@ pub struct FrameReference {
 
 impl FrameReference {
     /// The mean of two independent halves; errors are over the pixels whose `mask` is above 0 (`None`: all).
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] for halves of different sizes.
     pub fn new(halves: [&[f32]; 2], channels: usize, width: usize, mask: Option<Vec<f32>>) -> Result<Self> {
         let [a, b] = halves.map(|half| Displayed::new(half, channels));
         let rmse = 0.5 * ImagePair::new(&a.coded, &b.coded, channels, mask.as_deref())?.rmse();
@@ -107,9 +104,6 @@ impl FrameReference {
     }
 
     /// Errors of an image, of linear values.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] for another size.
     pub fn errors_of(&self, image: &[f32]) -> Result<ImageErrors> {
         let (displayed, mask) = (Displayed::new(image, self.channels), self.mask.as_deref());
         let rmse = self.rmse_over(&displayed, mask)?;
@@ -129,9 +123,6 @@ impl FrameReference {
     }
 
     /// RMSE of what is displayed, over the pixels whose `mask` is above 0 (`None`: all).
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] for another size.
     pub fn rmse_over(&self, displayed: &Displayed, mask: Option<&[f32]>) -> Result<f64> {
         Ok(ImagePair::new(&displayed.coded, &self.displayed.coded, self.channels, mask)?.rmse())
     }
@@ -176,9 +167,6 @@ impl FlickerMeter {
     }
 
     /// Adds the next frame.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] when sizes differ.
     pub fn add(&mut self, displayed: &Displayed) -> Result<()> {
         self.frames += 1;
         if self.frames < self.after {

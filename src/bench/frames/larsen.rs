@@ -60,9 +60,6 @@ pub fn remarks(results: &[StillResult]) -> Vec<String> {
 
 /// Looks for the most rays per pixel with which a frame of ours, camera rays included, takes no longer than one of theirs, by the median of what they take, and adds its error to the record;
 /// nothing where one of the two was not measured or one ray takes longer already.
-///
-/// # Errors
-/// Those of making frames.
 pub fn measure_equal_time(
     record: &mut Record,
     scene: &str,

@@ -32,9 +32,6 @@ use crate::error::Result;
 use crate::terminal::console::Failure;
 
 /// Measures, shows, writes.
-///
-/// # Errors
-/// The first that went wrong; what was measured is written all the same.
 pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     args.check()?;
     let scenes = scenes::choose(args);

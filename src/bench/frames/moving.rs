@@ -23,9 +23,6 @@ struct Moment {
 }
 
 /// Measures all presets.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut motion: Motion) -> Result<()> {
     let (part, paths) = (motion.name(), session.args.moving_reference_paths());
     session.phase(format!("{scene}, {part}: references"));

@@ -43,9 +43,6 @@ const TRIES: usize = 3;
 const NEAR: f64 = 0.05;
 
 /// Gives all peers a scene, has them render their references, and takes their times. Those that fail are left out with a note.
-///
-/// # Errors
-/// Those of our own side; Ctrl-C.
 pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -> Result<Vec<PeerImages>> {
     let mut images = Vec::new();
     for peer in 0..session.peers.len() {
@@ -60,9 +57,6 @@ pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -
 }
 
 /// Adds to the record images of every peer in the time of so many frames of a preset, `(frames, milliseconds)`. One that fails is left out from here on, with a note.
-///
-/// # Errors
-/// Those of our own side; Ctrl-C.
 pub fn render_beside(
     session: &mut FramesSession,
     (scene, preset): (&str, &str),

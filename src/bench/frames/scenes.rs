@@ -46,9 +46,6 @@ pub fn choose(args: &BenchFramesArgs) -> SceneList {
 }
 
 /// Fails for a scene that is not there.
-///
-/// # Errors
-/// Those of [`check_exists`].
 pub fn check(source: &str) -> Result<()> {
     if [INTERIOR, room::NAME].contains(&source) { Ok(()) } else { check_exists(source) }
 }
@@ -93,9 +90,6 @@ const REACH: f64 = 0.25;
 const PLANE: f64 = 12.0;
 
 /// Loads a scene, lights it where it is dark, and chooses its views.
-///
-/// # Errors
-/// Those of loading the scene or the environment.
 pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
     // the scene, without what would cover it and with what it stands on
     let is_interior = source == INTERIOR;

@@ -32,9 +32,6 @@ const QUICK_SIZES: [[u32; 2]; 2] = [[80, 45], [160, 90]];
 const SAMPLED: usize = 4;
 
 /// Measures a whole series. `scenes`: those on the command line, or the default ones.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -> Result<()> {
     let args = session.args;
     let sources: Vec<String> = match series {

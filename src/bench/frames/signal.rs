@@ -40,9 +40,6 @@ pub struct Signal {
 
 impl Signal {
     /// What the arguments ask for, in an image of this size; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
-    ///
-    /// # Errors
-    /// Those of [`Occlusion::new`].
     pub fn new(args: &BenchFramesArgs, size: [u32; 2], reach: f64, bounces: Option<u32>) -> Result<Self> {
         let mut settings = RenderSettings { integrator: Some(args.integrator()), ..RenderSettings::default() };
         settings.image.size = Some(size);
@@ -70,9 +67,6 @@ impl Signal {
     }
 
     /// Settings of a preset's frames, as `render` has them; all work is done in every frame.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
     pub fn frame_settings(&self, candidate: &Candidate) -> Result<Settings> {
         let mut render = self.render_settings(candidate.preset);
         render.frames.technique = candidate.technique;
@@ -87,25 +81,16 @@ impl Signal {
     }
 
     /// Scene data that a tracer needs for all of this.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
     pub fn needs(&self) -> Result<Needs> {
         Ok(frame_needs(&self.settings, &self.default_settings()?))
     }
 
     /// Streams that are traced.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
     pub fn streams(&self) -> Result<Vec<&'static StreamShaders>> {
         Ok(frame_streams(&self.settings, &self.default_settings()?))
     }
 
     /// Makes frames of a preset with these settings, which are [`Signal::frame_settings`] of it or near them.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn realtime(
         &self,
         tracer: &Tracer,
@@ -121,9 +106,6 @@ impl Signal {
     }
 
     /// Makes images of independent samples.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn sampler(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera) -> Result<Sampler> {
         let frame = self.default_settings()?;
         Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &frame)? {
@@ -168,9 +150,6 @@ impl Sampler {
     }
 
     /// Turns the environment map.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         match self {
             Self::Paths { integrator, .. } => integrator.turn_environment(to_map),
@@ -179,9 +158,6 @@ impl Sampler {
     }
 
     /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose.
-    ///
-    /// # Errors
-    /// Those of [`PathIntegrator::move_lights`].
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         match self {
             Self::Paths { integrator, .. } => integrator.move_lights(tracer, scene),
@@ -190,9 +166,6 @@ impl Sampler {
     }
 
     /// An image of `paths` samples per pixel, and the seconds that it took.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn render(&mut self, tracer: &Tracer, camera: &CameraRecord, paths: u32, seed: u32) -> Result<(Vec<f32>, f64)> {
         match self {
             Self::Paths { integrator, .. } => {
@@ -220,9 +193,6 @@ impl Sampler {
     }
 
     /// Takes the times of an image of few and one of many paths.
-    ///
-    /// # Errors
-    /// Those of [`Sampler::render`].
     pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         clock.take(|paths| Ok(self.render(tracer, camera, paths, 0)?.1))
     }
@@ -236,9 +206,6 @@ pub struct PlainClock {
 
 impl PlainClock {
     /// Takes the times of an image of few and one of many paths. `image` renders one, and returns its seconds.
-    ///
-    /// # Errors
-    /// Those of `image`.
     pub fn take<E>(&mut self, mut image: impl FnMut(u32) -> Result<f64, E>) -> Result<(), E> {
         for (seconds, paths) in self.seconds.iter_mut().zip(TIMED_PATHS) {
             seconds.push(image(paths)?);

@@ -122,9 +122,6 @@ pub struct FrameInputs {
 
 impl FrameInputs {
     /// Changes the light of a frame to what is new in it.
-    ///
-    /// # Errors
-    /// Those of [`Realtime::move_lights`].
     pub fn light(&self, realtime: &mut Realtime, tracer: &Tracer) -> Result<()> {
         if let Some(to_map) = self.to_map {
             realtime.turn_environment(to_map);
@@ -156,9 +153,6 @@ pub struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     /// Builds the tracer for images of this size, and finds out how long a path takes.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn new(
         session: &FramesSession,
         (loaded, view): (&FramesScene, &'a View),
@@ -216,9 +210,6 @@ impl<'a> Stage<'a> {
     }
 
     /// Brings scene, camera and light to a frame. Frames need not come in order.
-    ///
-    /// # Errors
-    /// Those of updating the tracer.
     pub fn move_to(&mut self, motion: &mut Motion, frame: u32) -> Result<FrameInputs> {
         let camera = self.still_camera();
         if !motion.moves_objects() {
@@ -254,17 +245,11 @@ impl<'a> Stage<'a> {
     }
 
     /// Puts an instance somewhere.
-    ///
-    /// # Errors
-    /// Those of [`Tracer::update`].
     pub fn place(&mut self, instance: (usize, DAffine3)) -> Result<UpdateStats> {
         self.tracer.update(&Changes { instances: vec![instance], ..Default::default() })
     }
 
     /// Tells a dynamic scene that it stands still in the next frame: motion vectors are those since its last update.
-    ///
-    /// # Errors
-    /// Those of [`Tracer::update`].
     pub fn rest(&mut self) -> Result<()> {
         if self.tracer.is_dynamic() {
             self.tracer.update(&Changes::default())?;
@@ -273,41 +258,26 @@ impl<'a> Stage<'a> {
     }
 
     /// Turns the environment map of plain and of converged images.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         self.sampler.turn_environment(to_map)
     }
 
     /// Settings of a preset's frames.
-    ///
-    /// # Errors
-    /// Those of settings.
     pub fn settings(&self, candidate: &Candidate) -> Result<Settings> {
         Ok(Settings { seed: self.seed, ..self.signal.frame_settings(candidate)? })
     }
 
     /// Makes frames of a preset, without any history.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn realtime(&self, candidate: &Candidate) -> Result<Realtime> {
         self.realtime_with(candidate, self.settings(candidate)?)
     }
 
     /// The same with other settings.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn realtime_with(&self, candidate: &Candidate, settings: Settings) -> Result<Realtime> {
         self.signal.realtime(&self.tracer, self.flat, self.camera, candidate.preset, settings)
     }
 
     /// The last of some frames, every one with all of its camera rays: the camera moves by less than a thousandth of a pixel.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn jittered_frames(&self, candidate: &Candidate, settings: Settings, frames: u32) -> Result<(Vec<f32>, FrameLog)> {
         let mut realtime = self.realtime_with(candidate, settings)?;
         let (mut log, camera) = (FrameLog::default(), self.still_camera());
@@ -318,9 +288,6 @@ impl<'a> Stage<'a> {
     }
 
     /// What each pixel shows.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn surfaces(&self, camera: &CameraRecord) -> Result<Vec<Option<Surface>>> {
         let settings = Settings { primary: Some(Primary::Traced), ..Preset::Fast.settings() };
         let mut realtime = Realtime::new(&self.tracer, self.size, &settings, &[])?;
@@ -329,9 +296,6 @@ impl<'a> Stage<'a> {
     }
 
     /// What frames show of a scene that does not change, in each of so many from now on, without any past.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn frames_afresh(&self, realtime: &mut Realtime, camera: &CameraRecord, frames: u32) -> Result<Vec<Vec<f32>>> {
         realtime.reset();
         let mut log = FrameLog::default();
@@ -348,9 +312,6 @@ impl<'a> Stage<'a> {
     }
 
     /// A converged image of what the scene is now.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn reference(&mut self, camera: &CameraRecord, paths: u32) -> Result<FrameReference> {
         let mut half = |seed| Ok::<_, crate::Error>(self.sampler.render(&self.tracer, camera, paths.div_ceil(2), seed)?.0);
         let [a, b] = REFERENCE_SEEDS.map(&mut half);
@@ -365,25 +326,16 @@ impl<'a> Stage<'a> {
     }
 
     /// Plain accumulation of so many paths.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn plain(&mut self, camera: &CameraRecord, paths: u32, seed: u32) -> Result<Vec<f32>> {
         Ok(self.sampler.render(&self.tracer, camera, paths, seed)?.0)
     }
 
     /// Takes the time of plain accumulation.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn time_plain(&mut self, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         self.sampler.time(&self.tracer, camera, clock)
     }
 
     /// Plain accumulation of so many paths, and its errors.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn plain_image(
         &mut self,
         camera: &CameraRecord,
@@ -396,9 +348,6 @@ impl<'a> Stage<'a> {
 
     /// Plain accumulation over `frames` frames in the time of a preset's, every one of them denoised, and the errors of the last. Feature images count where the camera
     /// moves (`is_moving`): of one that stands still they are rendered once. `None` where Open Image Denoise is not there.
-    ///
-    /// # Errors
-    /// Those of the device and the library; Ctrl-C.
     pub fn denoised(
         &mut self,
         camera: &CameraRecord,

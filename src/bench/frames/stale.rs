@@ -17,9 +17,6 @@ const POOL: i64 = 2;
 const HALF_STEP: f64 = 1.0 / 510.0;
 
 /// Counts pixels of an image, [`AFTER`] frames after a change, that keep the old; and as many of a run that started after the change: what chance makes.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn count(
     stage: &Stage,
     realtime: &mut Realtime,

@@ -59,9 +59,6 @@ pub struct StillRun {
 }
 
 /// Measures a preset, and the peers `beside` it: errors are means over runs that differ in their samples alone. Time and flicker are those of the first.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(
     session: &mut FramesSession,
     scene: &str,
@@ -178,9 +175,6 @@ pub fn points(frames: u32) -> impl Iterator<Item = u32> {
 }
 
 /// Frames of a camera that stands still, from the first. `clock`: plain accumulation is timed beside them.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn run(
     stage: &mut Stage,
     candidate: &Candidate,
@@ -227,9 +221,6 @@ pub fn run(
 }
 
 /// A preset of ambient occlusion until nothing is traced any more, and what a frame costs then; nothing of what never rests.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure_rest(
     session: &mut FramesSession,
     scene: &str,

@@ -29,9 +29,6 @@ const LARSENS: &str = "Larsen: top level, ms: 4.9 M in 4 meshes 0.157, 6.7 M in 
 const MESH: usize = 0;
 
 /// Measures all scenes.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let sources = if session.args.common.quick { QUICK } else { SCENES };
     for (k, source) in sources.into_iter().enumerate() {

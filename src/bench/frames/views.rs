@@ -28,9 +28,6 @@ pub fn open_denoiser(session: &mut FramesSession) -> Option<Oidn> {
 }
 
 /// Measures a scene.
-///
-/// # Errors
-/// Those of loading the scene and of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -> Result<()> {
     // the scene, with all that may move in it
     let args = session.args;

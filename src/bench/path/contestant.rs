@@ -40,9 +40,6 @@ impl<'a> Contestant<'a> {
     }
 
     /// Renders an image and measures it. Those of the warming round are held against the reference, too: their seeds are their own.
-    ///
-    /// # Errors
-    /// Those of [`Engine::render`].
     pub fn render(&mut self, peers: &mut [Peer], round: u32, spp: u32, references: &[PathReference]) -> Result<(), PeerError> {
         let image = self.engine.render(peers, spp, 1 + round)?;
         let reference = &references[self.reference];

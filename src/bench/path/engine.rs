@@ -56,18 +56,12 @@ pub enum Engine<'a> {
 
 impl<'a> Engine<'a> {
     /// One of our own.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn own(tracer: &'a Tracer, flat: &FlatScene, camera: CameraRecord, options: &PathOptions) -> Result<Self> {
         let integrator = Box::new(PathIntegrator::new(tracer, flat, options)?);
         Ok(Self::Own { tracer, camera, integrator })
     }
 
     /// An image.
-    ///
-    /// # Errors
-    /// Those of the device or the peer; Ctrl-C.
     pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<TimedImage, PeerError> {
         match self {
             Self::Own { tracer, camera, integrator } => {
@@ -102,9 +96,6 @@ pub struct PathReference {
 }
 
 /// Renders the reference of an engine of this name for `limit` seconds. `advance` hears the share that is done.
-///
-/// # Errors
-/// Those of [`Engine::render`].
 pub fn render_reference(
     engine: &mut Engine,
     name: &str,

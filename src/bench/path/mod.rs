@@ -38,9 +38,6 @@ const REFERENCES: f64 = 0.4;
 const OWN: &str = "skylit";
 
 /// Measures, shows, writes.
-///
-/// # Errors
-/// The first that went wrong; what was measured is written all the same.
 pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(args);
     // before anything that takes long

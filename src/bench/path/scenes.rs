@@ -66,9 +66,6 @@ pub struct PathScene {
 }
 
 /// Loads a scene, lights it where it is dark, and chooses its view.
-///
-/// # Errors
-/// Those of loading the scene or the environment.
 pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene> {
     let mut scene = match BALLS.iter().find(|b| b.name == source) {
         Some(ball) => ball_scene(ball),

@@ -95,9 +95,6 @@ pub struct Contestant<'a> {
 
 impl<'a> Contestant<'a> {
     /// One of our own.
-    ///
-    /// # Errors
-    /// Those of [`BenchDevice::tracer`].
     pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
         let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
         let stats = tracer.stats();
@@ -118,9 +115,6 @@ impl<'a> Contestant<'a> {
     }
 
     /// A kernel of a peer that has the scene.
-    ///
-    /// # Errors
-    /// When the peer fails to build.
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
         let name = peer.spec.title_of(kernel);
@@ -172,9 +166,6 @@ impl<'a> Contestant<'a> {
     }
 
     /// Traces rays without timing and returns their hits.
-    ///
-    /// # Errors
-    /// Those of the device or the peer.
     pub fn hits(&self, peers: &mut [Peer], rays: &[Ray], mode: Mode, control: &mut dyn Control) -> Result<Vec<Hit>, PeerError> {
         match &self.engine {
             Engine::Own { tracer, .. } => {
@@ -213,9 +204,6 @@ pub struct RepeatTime {
 
 impl PreparedRun<'_> {
     /// One repeat.
-    ///
-    /// # Errors
-    /// Those of the device or the peer.
     pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<RepeatTime, PeerError> {
         match &mut self.engine {
             PreparedEngine::Own(prepared) => {
@@ -231,9 +219,6 @@ impl PreparedRun<'_> {
     }
 
     /// Number of rays of the last repeat that hit something.
-    ///
-    /// # Errors
-    /// Those of the device; [`Error::CheckFailed`] when the driver cut a traversal short.
     pub fn hit_count(&self) -> Result<u64, Error> {
         match &self.engine {
             PreparedEngine::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),

@@ -77,9 +77,6 @@ impl EdgeCounts {
 
 impl RaySession<'_> {
     /// Sends the rays, and adds what became of them to `found` and to the record.
-    ///
-    /// # Errors
-    /// Those of our own side; Ctrl-C.
     pub(super) fn edges(&mut self, found: &mut Vec<EdgeCounts>) -> Result<()> {
         let mut scenes = leak_scenes();
         scenes.extend(hard_leak_scenes(HARD.0, HARD.1));

@@ -64,9 +64,6 @@ struct StreamRun {
 }
 
 /// Runs the benchmark, prints the results and writes the files.
-///
-/// # Errors
-/// The first error; the results measured so far are written nevertheless.
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(&args.scenes, args.common.quick);
     // before anything that takes long: a broken peers file, a scene that does not exist

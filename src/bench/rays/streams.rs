@@ -77,9 +77,6 @@ pub struct RaySets([Vec<Ray>; 4]);
 
 impl RaySets {
     /// Makes them with a tracer.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn make(tracer: &Tracer, scene: &RayScene, size: [u32; 2], control: &mut dyn Control) -> Result<Self> {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let origin = scene.scene.origin();
