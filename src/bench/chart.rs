@@ -1,10 +1,9 @@
 //! Measurements as charts of a report: time against error with its Pareto front, what varies along an axis, and rates against the size of scenes.
 
-use super::record::{Better, FRAME, Measurement, REFERENCE, Record, SIZE, Values, quantity};
+use super::record::{Better, FRAME, Measurement, REFERENCE, Record, SIZE, quantity};
+use crate::report::pareto::{BEYOND, dominated, front};
 use crate::report::{Axis, Chart, Mark, Point, Series};
 
-/// Beyond the ends of every axis: points there are drawn at the end.
-const BEYOND: f64 = 1e200;
 /// Points of the dashed line of a law.
 const LAW_POINTS: u32 = 64;
 /// Quantities that have a chart of their own along an axis.
@@ -238,34 +237,11 @@ fn is_placed(m: &Measurement) -> bool {
 }
 
 fn point(x: f64, m: &Measurement) -> Point {
-    let y_bar = match m.values {
-        Values::Repeated(_) => m.values.spread(),
-        Values::Exact(_) => None,
-    };
-    Point { y_bar, ..Point::from((x, m.values.middle())) }
+    Point { y_bar: m.values.spread(), ..Point::from((x, m.values.middle())) }
 }
 
 fn dashed(name: &str, points: Vec<Point>) -> Series {
     Series { name: name.to_owned(), mark: Mark::Dashed, points }
-}
-
-/// For each point, whether another one dominates it: is less along one axis and no greater along the other. Points that are equal do not dominate each other.
-fn dominated(points: &[[f64; 2]]) -> Vec<bool> {
-    let dominates = |a: &[f64; 2], b: &[f64; 2]| a[0] <= b[0] && a[1] <= b[1] && a != b;
-    points.iter().map(|p| points.iter().any(|q| dominates(q, p))).collect()
-}
-
-/// The border of what points dominate, in steps from the upper end of the chart to its right end; `None` without points.
-fn front(points: &[Point]) -> Option<Series> {
-    let places: Vec<[f64; 2]> = points.iter().map(|p| [p.x, p.y]).collect();
-    let best = places.iter().zip(dominated(&places)).filter(|(_, is_dominated)| !is_dominated);
-    let mut best: Vec<[f64; 2]> = best.map(|(p, _)| *p).collect();
-    best.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let (first, last) = (best.first()?, best.last()?);
-    let steps = best.windows(2).flat_map(|w| [[w[1][0], w[0][1]], w[1]]);
-    let corners = [[first[0], BEYOND], *first].into_iter().chain(steps).chain([[BEYOND, last[1]]]);
-    let corner = |[x, y]: [f64; 2]| Point { label: "Pareto front".into(), ..Point::from((x, y)) };
-    Some(Series { name: "Pareto front".into(), mark: Mark::Border, points: corners.map(corner).collect() })
 }
 
 #[cfg(test)]
@@ -279,18 +255,6 @@ mod tests {
 
     fn titles(charts: &[Chart]) -> Vec<&str> {
         charts.iter().map(|c| c.title.as_str()).collect()
-    }
-
-    #[test]
-    fn what_another_one_beats_in_everything_is_dominated() {
-        let points = [[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [5.0, 1.0], [5.0, 2.0], [1.0, 6.0], [2.0, 2.0]];
-        assert_eq!(dominated(&points), [false, false, true, false, true, true, false]);
-        let named = |(x, y)| Point::from((x, y));
-        let front = front(&[(3.0, 1.0), (1.0, 3.0), (2.0, 2.0), (3.0, 3.0)].map(named)).unwrap();
-        let corners: Vec<_> = front.points.iter().map(|p| (p.x, p.y)).collect();
-        let steps = [(1.0, 3.0), (2.0, 3.0), (2.0, 2.0), (3.0, 2.0), (3.0, 1.0)];
-        assert_eq!(corners[1..6], steps);
-        assert!(corners[0] == (1.0, BEYOND) && corners[6] == (BEYOND, 1.0) && super::front(&[]).is_none());
     }
 
     #[test]

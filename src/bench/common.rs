@@ -144,11 +144,6 @@ pub struct JsonRecord<'a> {
 }
 
 impl CommonArgs {
-    /// The console with these options.
-    pub fn console(&self) -> Console {
-        self.outputs.console()
-    }
-
     /// Checks the arguments before anything that takes long. The plan has made the folder of the report.
     pub fn check(&self) -> Result<FilePlan> {
         let mut plan = self.plan();

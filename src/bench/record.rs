@@ -7,9 +7,13 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub(super) use super::quantity;
+pub use super::quantity::{Better, Quantity, plain};
 use crate::error::{Error, Result};
 use crate::files;
-use crate::measure::stats::{Percentiles, number_or_nan};
+use crate::measure::displayed::ImageErrors;
+use crate::measure::regression::Values;
+use crate::measure::stats::Percentiles;
 use crate::terminal::console::one_line;
 
 /// Which benchmark a record is of.
@@ -133,51 +137,6 @@ pub struct Position {
     pub value: f64,
 }
 
-/// Which values of a quantity are better.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Better {
-    /// Small ones.
-    Less,
-    /// Great ones.
-    More,
-    /// Neither: it is not compared with a baseline.
-    Neither,
-}
-
-/// Values of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Values {
-    /// Repeated measurements, which have noise.
-    Repeated(Percentiles),
-    /// What is the same in every run on the same device. JSON has null for a number that is not finite.
-    Exact(#[serde(deserialize_with = "number_or_nan")] f64),
-}
-
-impl Values {
-    /// Whether it has noise.
-    pub fn is_repeated(&self) -> bool {
-        matches!(self, Self::Repeated(_))
-    }
-
-    /// The median, or the value.
-    pub fn middle(&self) -> f64 {
-        match self {
-            Self::Repeated(p) => p.median,
-            Self::Exact(v) => *v,
-        }
-    }
-
-    /// The 5th to the 95th percentile, where several values differ.
-    pub fn spread(&self) -> Option<[f64; 2]> {
-        match self {
-            Self::Repeated(p) if p.count > 1 && p.p5 > 0.0 && p.p95 > p.p5 => Some([p.p5, p.p95]),
-            _ => None,
-        }
-    }
-}
-
 impl Measurement {
     /// What it was measured of: scene, part, contestant, position.
     pub fn row(&self) -> String {
@@ -203,68 +162,6 @@ pub const SIZE: &str = "triangles and spheres";
 pub const FRAME: &str = "frame";
 /// Contestant that others are compared with.
 pub const REFERENCE: &str = "reference";
-
-/// A quantity with its unit.
-#[derive(Clone, Copy, Debug)]
-pub struct Quantity<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// Its unit.
-    pub unit: &'a str,
-    /// Which values are better.
-    pub better: Better,
-}
-
-/// A quantity of which less is better.
-const fn less<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
-    Quantity { name, unit, better: Better::Less }
-}
-
-/// A quantity that is not compared with a baseline.
-pub const fn plain<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
-    Quantity { name, unit, better: Better::Neither }
-}
-
-impl Quantity<'_> {
-    /// The same, not compared with a baseline.
-    pub const fn not_compared(self) -> Self {
-        Self { better: Better::Neither, ..self }
-    }
-}
-
-/// Quantities that charts know, or that several parts measure.
-pub mod quantity {
-    use super::{Better, Quantity, less, plain};
-
-    /// Time of a frame.
-    pub const FRAME_TIME: Quantity = less("time", "ms");
-    /// Time of an image.
-    pub const IMAGE_TIME: Quantity = less("time", "s");
-    /// Time to bring a structure up to date.
-    pub const UPDATE_TIME: Quantity = less("update", "ms");
-    /// Root mean squared error, the reference's own included.
-    pub const RMSE: Quantity = less("RMSE", "");
-    /// Root mean squared error without the reference's.
-    pub const CORRECTED: Quantity = plain("corrected RMSE", "");
-    /// Root mean squared error of plain accumulation in the same time.
-    pub const PLAIN_RMSE: Quantity = plain("plain RMSE", "");
-    /// The same without the reference's.
-    pub const PLAIN_CORRECTED: Quantity = plain("corrected plain RMSE", "");
-    /// Error before the filter.
-    pub const UNFILTERED: Quantity = plain("unfiltered RMSE", "");
-    /// Rays a second.
-    pub const RATE: Quantity = Quantity { name: "rate", unit: "Mrays/s", better: Better::More };
-    /// Rays of a frame.
-    pub const RAYS: Quantity = plain("rays", "");
-    /// Camera rays of a frame.
-    pub const CAMERA_RAYS: Quantity = plain("camera rays", "");
-    /// Differences of consecutive frames.
-    pub const FLICKER: Quantity = less("flicker", "");
-    /// Bytes of a hierarchy.
-    pub const BYTES: Quantity = less("bytes a primitive", "");
-    /// Nodes that a ray visits.
-    pub const NODES: Quantity = less("nodes a ray", "");
-}
 
 /// Adds results of one contestant in one part.
 pub struct Row<'a> {
@@ -320,6 +217,16 @@ impl Row<'_> {
         let measured = values.into().filter(|p| p.median > 0.0 && p.median.is_finite());
         measured.into_iter().for_each(|p| self.add(quantity, Values::Repeated(p)));
         self
+    }
+}
+
+impl Row<'_> {
+    /// Adds the errors of an image.
+    pub fn errors(&mut self, e: &ImageErrors) {
+        self.exact(quantity::RMSE, e.rmse).exact(quantity::CORRECTED, e.corrected);
+        self.exact(plain("bias", ""), e.bias).exact(plain("FLIP", ""), e.flip).exact(plain("rel MSE", ""), e.rel_mse);
+        let similarity = |k: usize| e.similarity.map(|s| s[k]);
+        self.exact(plain("Tanimoto", ""), similarity(0)).exact(plain("minimum ratio", ""), similarity(1));
     }
 }
 
@@ -451,13 +358,6 @@ fn unmeasurable(value: &Value) -> Option<String> {
     }
 }
 
-/// The root of a mean squared error without the error of the reference that it was measured against, which is independent of it; 0 where nothing is left. NaN
-/// stays what it is.
-pub fn without_reference(rmse: f64, reference_rmse: f64) -> f64 {
-    let squares = rmse * rmse - reference_rmse * reference_rmse;
-    if squares < 0.0 { 0.0 } else { squares.sqrt() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -525,12 +425,5 @@ mod tests {
             let is_named = number == "1e999" || error.to_string().contains("measurements.0.values is ");
             assert!(error.exit_code() == 3 && is_named, "{error}");
         }
-    }
-
-    #[test]
-    fn the_references_own_error_is_taken_off() {
-        assert!((without_reference(0.5, 0.3) - 0.4).abs() < 1e-12);
-        assert_eq!(without_reference(0.1, 0.2), 0.0);
-        assert!(without_reference(f64::NAN, 0.1).is_nan());
     }
 }

@@ -52,7 +52,7 @@ impl<'a, A> Session<'a, A> {
         let plan = common.check()?;
         let baseline = common.baseline.as_deref().map(Baseline::read).transpose()?;
         interrupt::install();
-        let console = common.console();
+        let console = common.outputs.console();
         let device = BenchDevice::open(common)?;
         let control = ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false };
         let record = record(&device);

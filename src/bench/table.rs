@@ -1,7 +1,8 @@
 //! Measurements as tables: a table for each part of a scene, a row a contestant, a column a quantity or a place along an axis. In the terminal they are text.
 
 use super::chart::distinct;
-use super::record::{Measurement, Record, Values};
+use super::record::{Measurement, Record};
+use crate::measure::regression::Values;
 use crate::report::{Cell, Part, Row, Table, format_number};
 
 /// Columns of a table at most; what has more goes on below.
@@ -86,7 +87,7 @@ fn cell(values: &Values) -> Cell {
 pub fn lines(parts: &[Part]) -> Vec<String> {
     let lines_of = |part: &Part| match part {
         Part::Text(text) => vec![format!("  {text}")],
-        Part::Table(table) => aligned(table).into_iter().map(|line| format!("  {line}")).chain([String::new()]).collect(),
+        Part::Table(table) => table.lines().into_iter().map(|line| format!("  {line}")).chain([String::new()]).collect(),
         Part::Chart(_) | Part::Images(_) => Vec::new(),
     };
     parts.iter().flat_map(lines_of).collect()
@@ -112,34 +113,6 @@ pub fn scene_names(record: &Record) -> Vec<&str> {
     distinct(described.chain(record.measurements.iter().map(|m| m.scene.as_str())))
 }
 
-/// Lines of a table: the first column to the left, the others to the right.
-fn aligned(table: &Table) -> Vec<String> {
-    let titles: Vec<&str> = table.columns.iter().map(|c| c.title.as_str()).collect();
-    let rows: Vec<Vec<&str>> = table.rows.iter().map(|r| r.cells.iter().map(|c| c.text.as_str()).collect()).collect();
-    let all: Vec<&Vec<&str>> = std::iter::once(&titles).chain(&rows).collect();
-    let width = |c: usize| all.iter().filter_map(|row| row.get(c)).map(|text| text.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..titles.len()).map(width).collect();
-    let cell = |(c, text): (usize, &&str)| {
-        let w = widths.get(c).copied().unwrap_or(0);
-        if c == 0 { format!("{text:w$}") } else { format!("{text:>w$}") }
-    };
-    let line = |row: &&Vec<&str>| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned();
-    all.iter().map(line).collect()
-}
-
-/// A number with separators between thousands.
-pub fn thousands(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (k, c) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(c);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::record::{FRAME, quantity};
@@ -159,7 +132,7 @@ mod tests {
         record.scene("a").remarks.push("quality is exact: yes".into());
         let lines = scene_lines(&record, "a");
         assert_eq!(lines[..3], ["", "a:", "  12 primitives"]);
-        assert_eq!(lines[3], "  still       time, ms    RMSE  flicker");
+        assert_eq!(lines[3], "  still        time, ms    RMSE  flicker");
         assert_eq!(lines[4], "  fast     2.000..4.000       -        -");
         assert_eq!(lines[5], "  quality             -  0.2500        -");
         assert!(lines[7].starts_with("  still: RMSE by frame") && lines[7].ends_with("20"), "{lines:?}");
@@ -180,10 +153,5 @@ mod tests {
             _ => 0,
         });
         assert_eq!(widths.collect::<Vec<_>>(), [1 + MAX_COLUMNS, 1 + 3]);
-    }
-
-    #[test]
-    fn thousands_are_apart() {
-        assert_eq!([0, 999, 1000, 25_000_000].map(thousands), ["0", "999", "1,000", "25,000,000"]);
     }
 }

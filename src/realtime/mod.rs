@@ -15,6 +15,7 @@ mod resample;
 mod resources;
 pub mod sequence;
 pub mod settings;
+pub mod surface_masks;
 
 use glam::{DAffine3, DMat3, DVec3};
 

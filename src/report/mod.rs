@@ -23,6 +23,7 @@ mod images;
 pub mod labels;
 mod layout;
 mod page;
+pub mod pareto;
 mod svg;
 mod table;
 
@@ -30,7 +31,7 @@ pub use chart::{Axis, Chart, Mark, Point, Scale, Series};
 pub use images::{ComparedImage, ImageComparison};
 pub use page::{address, write};
 pub use svg::{check_svg_name, write_svg};
-pub use table::{Cell, Column, Row, Status, Table, format_number};
+pub use table::{Cell, Column, Row, Status, Table, format_number, thousands};
 
 /// A page of a report.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,5 @@
 //! `--baseline`: the results of a run beside those of an earlier one, so that what became worse beyond noise is found.
 
-mod rule;
 mod table;
 
 use std::collections::HashMap;
@@ -10,12 +9,9 @@ use serde::Serialize;
 
 use super::record::{BenchKind, Better, Measurement, Record};
 use crate::error::{Error, Result};
+use crate::measure::regression::{Judged, Judgement, RULE, judge};
 use crate::measure::stats::median;
 use crate::report::Part;
-use rule::{Change, Judgement, judge};
-
-/// The rule, in a sentence, as reports say it.
-pub const RULE: &str = rule::TEXT;
 
 /// An earlier record.
 #[derive(Clone, Debug)]
@@ -52,6 +48,23 @@ pub struct BaselineReport {
     pub new: usize,
     /// Differences between the machines.
     pub warnings: Vec<String>,
+}
+
+/// A result that changed beyond noise.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// What it was measured of.
+    pub row: String,
+    /// Quantity and unit.
+    pub quantity: String,
+    /// Median of the baseline.
+    pub before: f64,
+    /// Median of this run.
+    pub now: f64,
+    /// How much worse it is, as a share of the baseline; negative where it is better.
+    pub worse_by: f64,
+    /// How much would still be noise.
+    pub noise: f64,
 }
 
 impl Baseline {
@@ -114,7 +127,10 @@ impl Baseline {
             };
             let now = &nows[*k];
             report.compared += 1;
-            let (judgement, change) = judge(before, now);
+            let Judged { judgement, worse_by, noise } = judge(&before.values, &now.values, now.better == Better::More);
+            let [before_value, now_value] = [before, now].map(|m| m.values.middle());
+            let (row, quantity) = (now.row(), now.title());
+            let change = Change { row, quantity, before: before_value, now: now_value, worse_by, noise };
             if before.values.is_repeated() && change.worse_by.is_finite() {
                 changes.push(change.worse_by);
             }
@@ -179,8 +195,9 @@ impl BaselineReport {
 
 #[cfg(test)]
 mod tests {
-    use super::super::record::{HostInfo, Values};
+    use super::super::record::HostInfo;
     use super::*;
+    use crate::measure::regression::Values;
     use crate::measure::stats::Percentiles;
 
     fn result(row: &str, values: &[f64]) -> Measurement {

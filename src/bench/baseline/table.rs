@@ -1,7 +1,7 @@
 //! The comparison with a baseline as text and tables.
 
-use super::BaselineReport;
-use super::rule::{Change, TEXT};
+use super::{BaselineReport, Change};
+use crate::measure::regression::RULE;
 use crate::report::{Cell, Part, Row, Table, format_number};
 
 /// Names of missing results that are printed; the record has all.
@@ -21,7 +21,7 @@ pub fn parts(report: &BaselineReport) -> Vec<Part> {
         report.regressions.len(),
         report.improvements.len()
     );
-    let mut parts = vec![Part::Text(head), Part::Text(TEXT.to_owned())];
+    let mut parts = vec![Part::Text(head), Part::Text(RULE.to_owned())];
     if let Some(typical) = report.typical_change {
         parts.push(Part::Text(format!("repeated results are typically {}", relative(typical))));
     }

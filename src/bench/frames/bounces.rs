@@ -8,10 +8,10 @@ use super::scenes::{FramesScene, View};
 use super::stage::Stage;
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{plain, quantity};
-use crate::bench::table::thousands;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::realtime::Settings;
+use crate::report::thousands;
 use crate::scene::{Environment, load};
 
 /// A scene, and frames per second of that work at 1, 2, ... bounces: 1920x1080 pixels on a GeForce RTX 2070 Max-Q, children of nodes in the order of the ray's signs.

@@ -4,19 +4,19 @@ use glam::DVec3;
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
-use super::displayed::{Displayed, FrameReference};
 use super::frame_log::FrameLog;
-use super::masks;
-use super::room::Mover;
 use super::scenes::View;
-use super::signal::{EqualTime, PlainClock};
-use super::stage::{Stage, is_plain_timed, turned};
-use super::stale;
+use super::signal::EqualTime;
+use super::stage::{Stage, turned};
 use crate::bench::record::{Better, Quantity, REFERENCE, plain, quantity};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
+use crate::measure::displayed::{Displayed, FrameReference};
+use crate::measure::plain_time::{PlainClock, is_plain_timed};
+use crate::measure::stale::FreshImages;
 use crate::measure::temporal::{Ghosting, LagCurve, Residual, recovery};
-use crate::realtime::{Preset, Realtime};
+use crate::realtime::{Preset, Realtime, surface_masks};
+use crate::scene::builtin::moving_box::Mover;
 use crate::scene::{Camera, EnvironmentMap};
 use crate::tracer::MovedBounds;
 
@@ -30,6 +30,10 @@ const MIN_PIXELS: usize = 8;
 const RECOVERED: f64 = 1.1;
 /// Frames that are looked at after a change, at least.
 const MIN_FRAMES: u32 = 16;
+/// Frames after which no pixel of ambient occlusion may keep what is wrong.
+const STALE_AFTER: u32 = 8;
+/// Runs that never saw the old, which say how much chance does to a pixel.
+const FRESH_RUNS: u32 = 8;
 /// Axis of the record.
 const AXIS: &str = "frame after the change";
 /// Error of the first frame after a change.
@@ -96,7 +100,7 @@ fn appear(session: &mut FramesSession, scene: &str, stage: &mut Stage, mover: Mo
     let (old, before) = (stage.reference(&camera, paths)?, stage.surfaces(&camera)?);
     stage.place(mover.at_home())?;
     let reference = stage.reference(&camera, paths)?;
-    let mask = Some(masks::unchanged(&stage.surfaces(&camera)?, &before, stage.reach));
+    let mask = Some(surface_masks::unchanged(&stage.surfaces(&camera)?, &before, stage.reach));
     let change = ChangeScene { part: "appear", camera_before: camera, camera, reference, old: Some(old), mask };
     let outcome = measure_presets(session, scene, stage, &change, |_, stage, is_after| {
         let update = stage.place(if is_after { mover.at_home() } else { mover.away() })?;
@@ -116,7 +120,7 @@ fn sidestep(session: &mut FramesSession, view: &View, stage: &mut Stage) -> Resu
     let step = STEP * to_world.translation.distance(view.middle);
     to_world.translation += to_world.transform_vector3(DVec3::X).normalize_or_zero() * step;
     let camera = stage.camera_record(&Camera { camera_to_world: to_world, ..view.camera.clone() });
-    let mask = masks::newly_seen(&stage.surfaces(&camera)?, &stage.surfaces(&from)?, &from, stage.size);
+    let mask = surface_masks::newly_seen(&stage.surfaces(&camera)?, &stage.surfaces(&from)?, &from, stage.size);
     if mask.iter().filter(|m| **m > 0.0).count() < MIN_PIXELS {
         session.note(format!("{scene}, sidestep: the step shows next to nothing new at this size"));
         return Ok(());
@@ -240,11 +244,18 @@ fn measure_preset(
     row.exact(plain("ghosting", ""), lag.ghosting);
     run.memory_half_life = Some(lag.memory.fitted_half_life());
     if let (Some(mask), true) = (mask, stage.channels() == 1) {
-        let after = stale::AFTER as usize - 1;
-        let image = images.get(after).map(|d| d.coded.as_slice()).unwrap_or_default();
+        // the sampler goes on: each run is another
+        let camera = &change.camera;
+        let mut run_afresh = || Ok::<_, Error>(stage.frames_afresh(&mut realtime, camera, STALE_AFTER)?.pop());
+        let mut fresh = FreshImages::new(stage.size);
+        for _ in 0..FRESH_RUNS {
+            run_afresh()?.iter().for_each(|image| fresh.add(image));
+        }
+        let chance = run_afresh()?.unwrap_or_default();
         let truths = [&change.reference, old].map(|r| r.displayed.coded.as_slice());
-        let counts = stale::count(stage, &mut realtime, &change.camera, (image, mask), truths)?;
-        row.exact(plain("stale pixels", ""), counts[0] as f64).exact(plain("stale by chance", ""), counts[1] as f64);
+        let shown = images.get(STALE_AFTER as usize - 1).map(|d| d.coded.as_slice()).unwrap_or_default();
+        let counts = [shown, &chance].map(|image| fresh.stale_pixels(image, mask, truths) as f64);
+        row.exact(plain("stale pixels", ""), counts[0]).exact(plain("stale by chance", ""), counts[1]);
     }
     Ok(run)
 }
@@ -298,11 +309,6 @@ pub fn add_ghost(
     ghosting.add(&shifted, reference, old, mask)
 }
 
-/// The mean of shares, if there is any.
-pub fn mean_share(shares: &[f64]) -> Option<f64> {
-    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,6 +322,5 @@ mod tests {
         let mut ghosting = Ghosting::default();
         let left = add_ghost(&mut ghosting, (&image, &settled), (&new, &old), None).unwrap();
         assert!((left.share - 0.25).abs() < 1e-6 && (ghosting.energy() - 0.0625).abs() < 1e-6);
-        assert_eq!((mean_share(&[]), mean_share(&[1.0, 2.0])), (None, Some(1.5)));
     }
 }

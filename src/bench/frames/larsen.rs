@@ -1,14 +1,14 @@
 //! The preset `balanced` beside the pipeline of Larsen (2019): rays and error of both, and how good it is when a frame may take as long.
 
 use super::candidates::Candidate;
-use super::displayed::FrameReference;
 use super::frame_log::{FrameLog, first_timed};
 use super::stage::Stage;
 use super::still::{StillResult, yes_or_no};
 use crate::bench::record::{Record, plain, quantity};
-use crate::bench::table::thousands;
 use crate::error::Result;
+use crate::measure::displayed::FrameReference;
 use crate::realtime::Settings;
+use crate::report::thousands;
 
 /// Preset that is compared.
 pub const OURS: &str = "balanced";
@@ -122,9 +122,9 @@ pub fn measure_equal_time(
 
 #[cfg(test)]
 mod tests {
-    use super::super::displayed::ImageErrors;
     use super::super::frame_log::FrameCost;
     use super::*;
+    use crate::measure::displayed::ImageErrors;
 
     fn result(name: &str, rays: f64, camera_rays: f64, rmse: &[f64], unfiltered: f64) -> StillResult {
         let cost = |camera_rays| FrameCost { rays, camera_rays, ..FrameCost::default() };

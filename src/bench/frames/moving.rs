@@ -2,17 +2,18 @@
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
-use super::change::{add_ghost, mean_share};
-use super::displayed::{FrameReference, ImageErrors};
+use super::change::add_ghost;
 use super::frame_log::{FrameLog, first_timed, measured};
-use super::masks;
-use super::signal::{EqualTime, PlainClock};
-use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, Stage, is_plain_timed};
+use super::signal::EqualTime;
+use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, Stage};
 use super::still::plain_remark;
 use crate::bench::record::{REFERENCE, plain, quantity};
 use crate::error::Result;
+use crate::measure::displayed::{FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, is_plain_timed};
 use crate::measure::stats::Percentiles;
 use crate::measure::temporal::Ghosting;
+use crate::realtime::surface_masks;
 
 /// A frame whose error is measured.
 struct Moment {
@@ -37,7 +38,7 @@ pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut 
         let reference = stage.reference(&camera, paths)?;
         let before = match before {
             None => None,
-            Some((old, surfaces)) => Some((old, masks::unchanged(&stage.surfaces(&camera)?, &surfaces, stage.reach))),
+            Some((old, surfaces)) => Some((old, surface_masks::unchanged(&stage.surfaces(&camera)?, &surfaces, stage.reach))),
         };
         moments.push(Moment { frame, reference, before });
     }
@@ -128,13 +129,14 @@ fn measure_preset(
     let (errors, plain_image) = (mean(&errors), PlainImage { paths: time.paths(1), errors: mean(&plains) });
     cost.add_to(&mut session.record, [scene, part, candidate.name]);
     let mut row = session.record.row(scene, part, candidate.name);
-    errors.add_to(&mut row);
+    row.errors(&errors);
     row.exact(quantity::UNFILTERED, ImageErrors::mean(&unfiltered).map(|e| e.rmse));
     plain_image.add_to(&mut row, &errors);
     denoised.iter().for_each(|image| image.add_to(&mut row));
     row.repeated(quantity::UPDATE_TIME, Percentiles::of(&updates));
     if motion.moves_objects() {
-        row.exact(plain("left", ""), mean_share(&shares)).exact(plain("ghosting", ""), ghosting.energy());
+        let left = shares.iter().sum::<f64>() / shares.len() as f64;
+        row.exact(plain("left", ""), left).exact(plain("ghosting", ""), ghosting.energy());
     }
     let ratio = errors.over(&plain_image.errors);
     session.record.scene(scene).remarks.extend(ratio.map(|ratio| plain_remark(candidate.name, part, ratio)));

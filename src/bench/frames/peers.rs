@@ -4,13 +4,13 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::args::FramesSession;
-use super::displayed::{FrameReference, ImageErrors};
 use super::scenes::{FramesScene, View};
-use super::signal::{PlainClock, PlainTime, TIMED_PATHS};
 use super::stage::{PlainImage, REFERENCE_SEEDS, TIMED_IMAGES};
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::bench::record::{FRAME, plain, quantity};
 use crate::error::Result;
+use crate::measure::displayed::{FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, PlainTime, TIMED_PATHS};
 
 /// Values per pixel.
 const CHANNELS: usize = 3;

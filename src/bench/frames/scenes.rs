@@ -1,15 +1,15 @@
 //! Which scenes are measured, what lights them, from where they are seen, and what the moving camera goes round.
 
-use std::path::Path;
-
 use glam::{DAffine3, DVec3};
 
 use super::args::{BenchFramesArgs, ViewChoice};
-use super::room::{self, Mover};
-use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WELL_KNOWN, WellKnownScene, check_exists, sun_map};
+use crate::bench::scenes::{
+    FLIGHT_HELMET, SPONZA, SceneList, WELL_KNOWN, WellKnownScene, check_exists, environment_text, sun_map, table_name,
+};
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::integrators::Integrator;
+use crate::scene::builtin::moving_box::{self, Mover};
 use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Environment, Geometry, Instance, Material, Mesh, Scene, light_spec, load};
 use crate::settings::Capability;
@@ -18,15 +18,17 @@ use crate::settings::Capability;
 const INTERIOR: &str = "interior";
 /// Its lamp: a small emitter.
 const LAMP: &str = "sphere position=-4,2.6,0.6 radius=0.12 radiance=600";
+/// A room in which a box is moved about.
+const ROOM: &str = "room";
 /// Built-in scenes of the default list.
 const BUILTIN: [&str; 5] =
     ["builtin:cornell-box", "builtin:cornell-mirror", "builtin:cornell-glass-sphere", INTERIOR, "builtin:parade"];
 /// With `--quick`.
 const QUICK: [&str; 2] = ["builtin:cornell-box", "builtin:parade"];
 /// Those of ambient occlusion, after the well-known ones.
-const OCCLUSION: [&str; 4] = ["builtin:terrain:2450000", "builtin:instances:25000000", room::NAME, "builtin:parade"];
+const OCCLUSION: [&str; 4] = ["builtin:terrain:2450000", "builtin:instances:25000000", ROOM, "builtin:parade"];
 /// With `--quick`.
-const QUICK_OCCLUSION: [&str; 3] = ["builtin:stairs", "builtin:instances:25000", room::NAME];
+const QUICK_OCCLUSION: [&str; 3] = ["builtin:stairs", "builtin:instances:25000", ROOM];
 /// Well-known scenes of the default list.
 const FILES: [&WellKnownScene; 2] = [&SPONZA, &FLIGHT_HELMET];
 /// Material of the surface that covers Sponza's court: it is left out, so that the sun gets in.
@@ -47,7 +49,7 @@ pub fn choose(args: &BenchFramesArgs) -> SceneList {
 
 /// Fails for a scene that is not there.
 pub fn check(source: &str) -> Result<()> {
-    if [INTERIOR, room::NAME].contains(&source) { Ok(()) } else { check_exists(source) }
+    if [INTERIOR, ROOM].contains(&source) { Ok(()) } else { check_exists(source) }
 }
 
 /// A scene ready to be measured.
@@ -93,8 +95,8 @@ const PLANE: f64 = 12.0;
 pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
     // the scene, without what would cover it and with what it stands on
     let is_interior = source == INTERIOR;
-    let (mut scene, mover) = if source == room::NAME {
-        let (scene, mover) = room::build_room();
+    let (mut scene, mover) = if source == ROOM {
+        let (scene, mover) = moving_box::build_room();
         (scene, Some(mover))
     } else {
         (load::load(if is_interior { "builtin:atrium" } else { source })?, None)
@@ -111,7 +113,7 @@ pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
     let light = light(&mut scene, is_interior, args)?;
 
     // where it is seen from
-    let name = name(source);
+    let name = table_name(&WELL_KNOWN, source);
     let mut views = Vec::new();
     for choice in args.views() {
         let camera = match (choice, known) {
@@ -135,7 +137,7 @@ pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
         let name = if has_several { format!("{name}, {}", choice.name()) } else { name.clone() };
         views.push(View { name, camera, middle });
     }
-    let reach = if mover.is_some() { room::REACH } else { known.map_or(REACH * (hi - lo).length(), |k| k.reach) };
+    let reach = if mover.is_some() { moving_box::REACH } else { known.map_or(REACH * (hi - lo).length(), |k| k.reach) };
     Ok(FramesScene { name, scene, views, light, reach, mover })
 }
 
@@ -162,17 +164,7 @@ fn light(scene: &mut Scene, is_interior: bool, args: &BenchFramesArgs) -> Result
     if scene.is_dark() || args.environment.is_some() {
         scene.environment = Environment::Map(sun_map(args.environment.as_deref(), args.common.quick)?);
     }
-    Ok(match &scene.environment {
-        Environment::Black => "its own".to_owned(),
-        Environment::Uniform(c) => format!("constant environment {},{},{}", c.x, c.y, c.z),
-        Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
-    })
-}
-
-/// In tables.
-fn name(source: &str) -> String {
-    let stem = WellKnownScene::find(&WELL_KNOWN, source).and_then(|_| Path::new(source).file_stem());
-    stem.map_or_else(|| source.to_owned(), |s| s.to_string_lossy().into_owned())
+    Ok(environment_text(&scene.environment, "its own"))
 }
 
 #[cfg(test)]
@@ -190,7 +182,7 @@ mod tests {
     #[test]
     fn every_scene_is_lit_and_has_something_to_go_round() {
         let args = Alone::try_parse_from(["bench", "--quick"]).unwrap().args;
-        for source in [INTERIOR, "builtin:parade", "builtin:cornell-box", room::NAME] {
+        for source in [INTERIOR, "builtin:parade", "builtin:cornell-box", ROOM] {
             check(source).unwrap();
             let loaded = load(source, &args).unwrap();
             assert!(!loaded.scene.is_dark(), "{source}");
@@ -210,7 +202,7 @@ mod tests {
         let loaded = load("builtin:stairs", &args).unwrap();
         let names: Vec<_> = loaded.views.iter().map(|v| v.name.as_str()).collect();
         assert_eq!(names, ["builtin:stairs, near", "builtin:stairs, far"]);
-        assert!(loaded.mover.is_none() && load(room::NAME, &args).unwrap().mover.is_some());
+        assert!(loaded.mover.is_none() && load(ROOM, &args).unwrap().mover.is_some());
     }
 
     #[test]

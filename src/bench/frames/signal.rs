@@ -11,10 +11,10 @@ use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
-use crate::measure::stats::median;
+use crate::measure::plain_time::{PlainClock, PlainTime};
 use crate::raster::Primary;
 use crate::realtime::frame_settings::Antialias;
-use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
+use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings, Technique};
 use crate::renderer::RenderSettings;
 use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
 use crate::scene::{Camera, Scene};
@@ -27,8 +27,6 @@ use crate::tracer::{Needs, Tracer};
 const MAX_PATHS: u32 = 1 << 16;
 /// Occlusion rays of a pixel in one launch at most.
 const MAX_RAYS: u32 = 256;
-/// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
-pub const TIMED_PATHS: [u32; 2] = [1, 9];
 
 /// What frames of one scene show.
 pub struct Signal {
@@ -68,26 +66,24 @@ impl Signal {
 
     /// Settings of a preset's frames, as `render` has them; all work is done in every frame.
     pub fn frame_settings(&self, candidate: &Candidate) -> Result<Settings> {
-        let mut render = self.render_settings(candidate.preset);
-        render.frames.technique = candidate.technique;
-        let settings = Settings { rest: false, ..frame_settings(&render)? };
-        Ok(self.occlusion.map_or(settings, |occlusion| occlusion.apply_to(settings)))
+        self.preset_settings(candidate.preset, candidate.technique)
     }
 
-    /// Settings of frames with the defaults of `render`.
-    fn default_settings(&self) -> Result<Settings> {
-        let settings = Settings { rest: false, ..frame_settings(&self.render_settings(Preset::Balanced))? };
+    fn preset_settings(&self, preset: Preset, technique: Option<Technique>) -> Result<Settings> {
+        let mut render = self.render_settings(preset);
+        render.frames.technique = technique;
+        let settings = Settings { rest: false, ..frame_settings(&render)? };
         Ok(self.occlusion.map_or(settings, |occlusion| occlusion.apply_to(settings)))
     }
 
     /// Scene data that a tracer needs for all of this.
     pub fn needs(&self) -> Result<Needs> {
-        Ok(frame_needs(&self.settings, &self.default_settings()?))
+        Ok(frame_needs(&self.settings, &self.preset_settings(Preset::Balanced, None)?))
     }
 
     /// Streams that are traced.
     pub fn streams(&self) -> Result<Vec<&'static StreamShaders>> {
-        Ok(frame_streams(&self.settings, &self.default_settings()?))
+        Ok(frame_streams(&self.settings, &self.preset_settings(Preset::Balanced, None)?))
     }
 
     /// Makes frames of a preset with these settings, which are [`Signal::frame_settings`] of it or near them.
@@ -107,7 +103,7 @@ impl Signal {
 
     /// Makes images of independent samples.
     pub fn sampler(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera) -> Result<Sampler> {
-        let frame = self.default_settings()?;
+        let frame = self.preset_settings(Preset::Balanced, None)?;
         Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &frame)? {
             Some(options) => {
                 let options = PathOptions { spp: MAX_PATHS, ..options };
@@ -198,52 +194,6 @@ impl Sampler {
     }
 }
 
-/// Times of images of independent samples. They are taken between the frames that they are compared with: a machine that slows down for a while slows both down.
-#[derive(Clone, Debug, Default)]
-pub struct PlainClock {
-    seconds: [Vec<f64>; 2],
-}
-
-impl PlainClock {
-    /// Takes the times of an image of few and one of many paths. `image` renders one, and returns its seconds.
-    pub fn take<E>(&mut self, mut image: impl FnMut(u32) -> Result<f64, E>) -> Result<(), E> {
-        for (seconds, paths) in self.seconds.iter_mut().zip(TIMED_PATHS) {
-            seconds.push(image(paths)?);
-        }
-        Ok(())
-    }
-
-    /// By the medians of all times.
-    pub fn time(&self) -> PlainTime {
-        let ms = [0, 1].map(|k| 1e3 * median(&self.seconds[k]).unwrap_or(f64::NAN));
-        PlainTime::through(TIMED_PATHS, ms)
-    }
-}
-
-/// Time of images of independent samples, milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlainTime {
-    /// Of an image, besides its paths.
-    pub per_image: f64,
-    /// Of each path per pixel.
-    pub per_path: f64,
-}
-
-impl PlainTime {
-    /// Of images that took `ms` for so many paths: a line through two points, neither part of which is negative.
-    fn through([few, many]: [u32; 2], [least, most]: [f64; 2]) -> Self {
-        let per_path = ((most - least) / f64::from(many - few)).clamp(0.0, most / f64::from(many));
-        // times have noise: paths are not free
-        let per_path = per_path.max(0.1 * most / f64::from(many));
-        Self { per_image: (least - f64::from(few) * per_path).max(0.0), per_path }
-    }
-
-    /// As many paths as an image of so many milliseconds can have: at least one.
-    pub fn paths_in(&self, ms: f64) -> u32 {
-        (((ms - self.per_image) / self.per_path) as u32).max(1)
-    }
-}
-
 /// The time of a preset's frames, in paths of plain accumulation.
 #[derive(Clone, Debug)]
 pub struct EqualTime {
@@ -292,9 +242,7 @@ mod tests {
 
     #[test]
     fn paths_that_fit_a_time() {
-        let time = PlainTime::through([1, 9], [5.0, 21.0]);
-        assert_eq!(time, PlainTime { per_image: 3.0, per_path: 2.0 });
-        assert_eq!([1.0, 5.0, 10.9, 23.0].map(|ms| time.paths_in(ms)), [1, 1, 3, 10]);
+        let time = PlainTime { per_image: 3.0, per_path: 2.0 };
         let frame = TypicalFrame { ms: 10.0, paths: 8.0 };
         let equal = EqualTime::new(time, vec![frame; 10]);
         // (10 - 3) / 2 of images; 8 of frames
@@ -304,8 +252,5 @@ mod tests {
         let short = TypicalFrame { ms: 5.0, paths: 0.5 };
         let rest = EqualTime::new(time, vec![short, short, frame, frame]);
         assert_eq!([1, 2, 3, 4, 5].map(|n| rest.paths(n)), [1, 3, 9, 17, 17]);
-        // noise alone
-        let odd = PlainTime::through([1, 9], [5.0, 4.0]);
-        assert!(odd.per_path > 0.0 && odd.per_image >= 0.0);
     }
 }

@@ -7,19 +7,20 @@ use glam::{DAffine3, DMat3};
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
-use super::displayed::{Displayed, FrameReference, ImageErrors};
 use super::frame_log::FrameLog;
-use super::room::Mover;
 use super::scenes::{FramesScene, View};
-use super::signal::{EqualTime, PlainClock, PlainTime, Sampler, Signal};
+use super::signal::{EqualTime, Sampler, Signal};
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{Row, plain, quantity};
 use crate::denoise::{DenoiseInput, Features, Oidn};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
+use crate::measure::displayed::{Displayed, FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, PlainTime};
 use crate::raster::Primary;
 use crate::realtime::sequence::FrameSequence;
 use crate::realtime::{Preset, Realtime, Settings, Surface};
+use crate::scene::builtin::moving_box::Mover;
 use crate::scene::{Camera, Environment, EnvironmentMap, Orbit, Scene};
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer, UpdateStats};
@@ -30,8 +31,6 @@ pub const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 pub const PLAIN_SEED: u32 = 0x5eed_0100;
 /// Images of plain accumulation whose time is taken before anything else.
 pub const TIMED_IMAGES: u32 = 9;
-/// Times of plain accumulation that are taken between frames.
-const TIMES_BETWEEN: usize = 4;
 /// How far the environment map turns in a frame, degrees: as far as the camera on its orbit.
 pub const DEGREES_PER_FRAME: f64 = 0.5;
 
@@ -377,12 +376,6 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Is the time of plain accumulation taken after a frame, counted from 0, of so many whose time counts from `first` on?
-pub fn is_plain_timed(frame: u32, first: usize, frames: u32) -> bool {
-    let step = (frames as usize - first).div_ceil(TIMES_BETWEEN);
-    (frame as usize).checked_sub(first).is_some_and(|n| n.is_multiple_of(step.max(1)))
-}
-
 /// The camera, but for less than a thousandth of a pixel in every second frame: enough that everything has to be looked at anew.
 fn jittered(camera: &CameraRecord, frame: u32) -> CameraRecord {
     let [width, height] = camera.view;
@@ -405,13 +398,5 @@ mod tests {
         assert!(moved != camera && jittered(&camera, 2) == camera);
         // pixels, at the border of a wide image
         assert!((moved.view[0] - camera.view[0]) / camera.view[0] * 3840.0 < 1e-3);
-    }
-
-    #[test]
-    fn plain_accumulation_is_timed_between_late_frames() {
-        let at = |frames: u32, first: usize| (0..frames).filter(|f| is_plain_timed(*f, first, frames)).collect::<Vec<_>>();
-        assert_eq!(at(96, 48), [48, 60, 72, 84]);
-        assert_eq!(at(8, 0), [0, 2, 4, 6]);
-        assert_eq!(at(4, 2), [2, 3]);
     }
 }

@@ -2,13 +2,14 @@
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
-use super::displayed::{Flicker, FlickerMeter, FrameReference, ImageErrors};
 use super::frame_log::{FrameCost, FrameLog, first_timed};
 use super::peers::{self, PeerImages};
-use super::signal::{EqualTime, PlainClock};
-use super::stage::{PlainImage, Stage, is_plain_timed};
+use super::signal::EqualTime;
+use super::stage::{PlainImage, Stage};
 use crate::bench::record::{FRAME, plain, quantity};
 use crate::error::Result;
+use crate::measure::displayed::{Flicker, FlickerMeter, FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, is_plain_timed};
 use crate::realtime::{Filter, FilterKind, Settings, Technique};
 
 /// Part of the record.
@@ -119,7 +120,7 @@ pub fn measure(
         camera_cost.add_to(record, [scene, WITH_CAMERA_RAYS, candidate.name]);
     }
     let mut row = record.row(scene, PART, candidate.name);
-    settled.add_to(&mut row);
+    row.errors(&settled);
     row.exact(quantity::UNFILTERED, unfiltered.map(|e| e.rmse));
     plains.iter().last().into_iter().for_each(|image| image.add_to(&mut row, &settled));
     row.exact(quantity::FLICKER, flicker.map(|f| f.rms)).exact(plain("worst flicker", ""), flicker.map(|f| f.greatest));
@@ -250,7 +251,7 @@ pub fn measure_rest(
     log.cost(first).add_to(&mut session.record, [scene, "rest", candidate.name]);
     let mut row = session.record.row(scene, "rest", candidate.name);
     row.exact(plain("frames to rest", ""), frames.map(f64::from));
-    reference.errors_of(&realtime.result()?)?.add_to(&mut row);
+    row.errors(&reference.errors_of(&realtime.result()?)?);
     Ok(())
 }
 

@@ -7,10 +7,10 @@ use super::stage::{Motion, Stage};
 use super::{change, larsen, moving, peers, still};
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{REFERENCE, plain, quantity};
-use crate::bench::table::thousands;
 use crate::denoise::Oidn;
 use crate::error::Result;
 use crate::realtime::sequence::{CameraMotion, FrameSequence};
+use crate::report::thousands;
 use crate::scene::{self, AnimationRig, Orbit};
 
 /// Frames a second of an animation.

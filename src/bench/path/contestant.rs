@@ -3,7 +3,7 @@
 use super::curve::{ErrorCurve, ErrorPoint};
 use super::engine::{Engine, PathReference};
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::record::without_reference;
+use crate::measure::displayed::without_reference;
 use crate::measure::metrics::{ImagePair, bad_pixels};
 use crate::measure::stats::median;
 

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use crate::accel::flatten::FlatScene;
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
+use crate::measure::halves::ReferenceHalves;
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::Tracer;
 

@@ -18,13 +18,14 @@ use scenes::PathScene;
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
 use super::record::{BenchKind, REFERENCE, Record, plain, quantity};
+use super::scenes::table_name;
 use super::session::Session;
-use super::table::thousands;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{self, PathOptions};
 use crate::measure::metrics::ImagePair;
+use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs};
@@ -71,7 +72,7 @@ fn measure(session: &mut PathSession, scenes: &[String], specs: Result<Vec<PeerS
 impl PathSession<'_> {
     fn scene(&mut self, source: &str) -> Result<()> {
         let (args, size) = (self.args, self.args.size());
-        let name = scenes::name(source);
+        let name = table_name(&scenes::FILES, source);
         self.phase(format!("{name}: building"));
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let loaded = scenes::load(source, args, aspect)?;

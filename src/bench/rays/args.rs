@@ -148,9 +148,13 @@ mod tests {
 
     #[test]
     fn json_with_and_without_a_file() {
-        assert!(parse(&["--json"]).common.console().json);
+        assert!(parse(&["--json"]).common.outputs.console().json);
         let to_file = parse(&["--json=a.json", "scene"]);
-        assert!(!to_file.common.console().json && to_file.common.outputs.json_file().is_some() && to_file.scenes == ["scene"]);
+        assert!(
+            !to_file.common.outputs.console().json
+                && to_file.common.outputs.json_file().is_some()
+                && to_file.scenes == ["scene"]
+        );
         // a scene after --json is a scene
         assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
     }

@@ -1,12 +1,12 @@
 //! Contestants: our own tracers and kernels, and those of peers, behind one interface.
 
-use super::streams::{Set, sample};
 use crate::accel::flatten::FlatScene;
 use crate::bench::device::BenchDevice;
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::DeviceInfo;
+use crate::integrators::ray_sets::{RaySet, sample};
 use crate::integrators::rays::{Mode, PreparedRays};
 use crate::ray::{Hit, Ray};
 use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
@@ -130,7 +130,7 @@ impl<'a> Contestant<'a> {
     }
 
     /// Is it made for such rays? Packets are for coherent ones alone.
-    pub fn is_for(&self, set: Set) -> bool {
+    pub fn is_for(&self, set: RaySet) -> bool {
         self.kernel != Some(Kernel::Packet) || set.is_coherent()
     }
 
@@ -151,7 +151,7 @@ impl<'a> Contestant<'a> {
     }
 
     /// Makes ready for one stream.
-    pub fn prepare<'c>(&'c self, set: Set, rays: &[Ray], mode: Mode) -> Result<PreparedRun<'c>> {
+    pub fn prepare<'c>(&'c self, set: RaySet, rays: &[Ray], mode: Mode) -> Result<PreparedRun<'c>> {
         match &self.engine {
             Engine::Own { tracer, divisor } => {
                 let rays = sample(rays, *divisor);

@@ -30,23 +30,16 @@ const HARD: (u32, u32) = (7, 1000);
 const SCENE: &str = "closed meshes";
 const PART: &str = "rays at edges";
 
-/// What became of a contestant's rays at shared edges and vertices of closed meshes.
+/// What became of a contestant's rays at shared edges and vertices of closed meshes: how many met nothing, asked for any and for the closest hit; how many closest hits are the oracle's, are
+/// others that rounding allows (at an edge, either side of it, or none), and neither.
+const COUNTS: [&str; 7] = ["meshes", "rays", "leaks, any", "leaks, closest", "agree", "ties", "unexplained"];
+
+/// Counts of a contestant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeCounts {
     contestant: String,
-    meshes: u32,
-    /// Fewer than the set's for slow tracers.
-    rays: u64,
-    /// Rays that met nothing, asked for any hit.
-    leaks_any: u64,
-    /// Rays that met nothing, asked for the closest.
-    leaks_closest: u64,
-    /// Closest hits that are the oracle's: the same primitive at the same distance but for rounding.
-    agree: u64,
-    /// Other answers that rounding allows: at an edge, either side of it, or none.
-    ties: u64,
-    /// All other answers.
-    unexplained: u64,
+    /// In the order of [`COUNTS`].
+    counts: [u64; 7],
     /// Whether leaks and unexplained answers are a failure: those of the compute tracer are.
     is_watertight: bool,
     /// The first of the unexplained.
@@ -55,21 +48,13 @@ pub struct EdgeCounts {
 
 impl EdgeCounts {
     fn fails(&self) -> bool {
-        self.is_watertight && self.leaks_any + self.leaks_closest + self.unexplained > 0
+        let [_, _, any, closest, _, _, unexplained] = self.counts;
+        self.is_watertight && any + closest + unexplained > 0
     }
 
     fn add_to(&self, record: &mut Record) {
         let mut row = record.row(SCENE, PART, &self.contestant);
-        let meshes = u64::from(self.meshes);
-        for (name, count) in [
-            ("meshes", meshes),
-            ("rays", self.rays),
-            ("leaks, any", self.leaks_any),
-            ("leaks, closest", self.leaks_closest),
-            ("agree", self.agree),
-            ("ties", self.ties),
-            ("unexplained", self.unexplained),
-        ] {
+        for (name, count) in COUNTS.into_iter().zip(self.counts) {
             row.exact(plain(name, ""), count as f64);
         }
     }
@@ -131,18 +116,8 @@ impl RaySession<'_> {
         let closest = contestant.hits(&mut self.peers, rays, Mode::Closest, &mut self.control)?;
         let report = judge_closest(oracle, rays, &closest, truth, Rounding::default());
         let examples = report.to_string().lines().skip(1).take(MAX_EXAMPLES).map(|l| l.trim().to_owned()).collect();
-        Ok(EdgeCounts {
-            contestant: contestant.name.clone(),
-            meshes: 1,
-            rays: report.rays,
-            leaks_any: missed(&any),
-            leaks_closest: missed(&closest),
-            agree: report.agree,
-            ties: report.ties,
-            unexplained: report.unexplained,
-            is_watertight,
-            examples,
-        })
+        let counts = [1, report.rays, missed(&any), missed(&closest), report.agree, report.ties, report.unexplained];
+        Ok(EdgeCounts { contestant: contestant.name.clone(), counts, is_watertight, examples })
     }
 }
 
@@ -151,13 +126,7 @@ fn add_counts(all: &mut Vec<EdgeCounts>, found: EdgeCounts) {
     match all.iter_mut().find(|e| e.contestant == found.contestant) {
         None => all.push(found),
         Some(sum) => {
-            sum.meshes += found.meshes;
-            sum.rays += found.rays;
-            sum.leaks_any += found.leaks_any;
-            sum.leaks_closest += found.leaks_closest;
-            sum.agree += found.agree;
-            sum.ties += found.ties;
-            sum.unexplained += found.unexplained;
+            sum.counts.iter_mut().zip(found.counts).for_each(|(sum, count)| *sum += count);
             sum.examples.extend(found.examples);
             sum.examples.truncate(MAX_EXAMPLES);
         }
@@ -171,10 +140,10 @@ pub(super) fn verdict(edges: &[EdgeCounts]) -> Result<()> {
         Some(e) => Err(Error::CheckFailed(format!(
             "'{}': of {} rays at edges of closed meshes {} leave them asked for any hit, {} asked for the closest, and {} meet what rounding does not explain ({})",
             e.contestant,
-            e.rays,
-            e.leaks_any,
-            e.leaks_closest,
-            e.unexplained,
+            e.counts[1],
+            e.counts[2],
+            e.counts[3],
+            e.counts[6],
             e.examples.first().map_or("no example", String::as_str)
         ))),
     }
@@ -186,16 +155,15 @@ mod tests {
 
     #[test]
     fn who_fails_at_edges() {
-        let counts = |is_watertight, leaks_any, unexplained| EdgeCounts {
+        let counts = |is_watertight, leaks, unexplained| EdgeCounts {
             is_watertight,
-            leaks_any,
-            unexplained,
+            counts: [1, 9, leaks, 0, 0, 0, unexplained],
             ..EdgeCounts::default()
         };
         assert!(verdict(&[counts(true, 0, 0), counts(false, 7, 3)]).is_ok());
         assert!(counts(true, 1, 0).fails() && verdict(&[counts(true, 0, 1)]).is_err());
         let mut all = vec![counts(true, 1, 0)];
         add_counts(&mut all, counts(true, 2, 5));
-        assert_eq!((all.len(), all[0].leaks_any, all[0].unexplained), (1, 3, 5));
+        assert_eq!((all.len(), all[0].counts), (1, [2, 18, 3, 0, 0, 0, 5]));
     }
 }

@@ -15,7 +15,7 @@ use check::Check;
 use contestant::{Contestant, KERNELS, PreparedRun, RepeatTime};
 use edges::EdgeCounts;
 use scenes::RayScene;
-use streams::{RaySets, STREAMS, Set, StreamKind};
+use streams::{STREAMS, StreamKind};
 
 use super::chart;
 use super::peers::file::{self, Measures, PeerSpec};
@@ -23,13 +23,14 @@ use super::peers::process::PeerError;
 use super::record::{BenchKind, Record, SIZE, plain, quantity};
 use super::scenes::check_exists;
 use super::session::Session;
-use super::table::thousands;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::integrators::ray_sets::{RaySet, RaySets};
 use crate::integrators::rays::Mode;
 use crate::measure::agreement;
 use crate::measure::stats::{LogScaling, Percentiles, paired_ratio};
 use crate::ray::Ray;
+use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
 use crate::tracer::Kernel;
@@ -163,11 +164,12 @@ impl RaySession<'_> {
             )));
         };
         self.phase(format!("{source}: making rays"));
-        let sets = RaySets::make(tracer, &loaded, size, &mut SilentControl)?;
+        let (seen, lit) = ((&loaded.scene, &loaded.camera), (loaded.ao_radius, loaded.light));
+        let sets = RaySets::new(tracer, seen, lit, size, &mut SilentControl)?;
         // contestants that failed on the way
         let mut failed = vec![false; contestants.len()];
         let requested: Vec<&StreamKind> = STREAMS.iter().filter(|s| self.wants(s)).collect();
-        for set in Set::ALL {
+        for set in RaySet::ALL {
             if requested.iter().any(|s| s.set == set) {
                 self.load_rays(&contestants, &mut failed, set, sets.get(set))?;
             }
@@ -298,7 +300,7 @@ impl RaySession<'_> {
     }
 
     /// Gives a set of rays to every peer that takes part.
-    fn load_rays(&mut self, contestants: &[Contestant], failed: &mut [bool], set: Set, rays: &[Ray]) -> Result<()> {
+    fn load_rays(&mut self, contestants: &[Contestant], failed: &mut [bool], set: RaySet, rays: &[Ray]) -> Result<()> {
         for index in 0..self.peers.len() {
             if !contestants.iter().zip(&*failed).any(|(c, f)| !f && c.peer_index() == Some(index)) {
                 continue;

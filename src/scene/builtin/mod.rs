@@ -7,10 +7,12 @@ pub mod analytic;
 pub mod atrium;
 pub mod cornell;
 pub mod many;
+pub mod moving_box;
 pub mod parade;
 pub mod pendulum;
 pub mod room;
 pub mod shapes;
+pub mod sun_map;
 pub mod terrain;
 
 use super::{Camera, Geometry, Instance, Material, Mesh, Scene};

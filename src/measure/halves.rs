@@ -1,7 +1,7 @@
 //! Reference images in two independent halves, so that the error of their mean is known.
 
+use super::metrics::ImagePair;
 use crate::error::Result;
-use crate::measure::metrics::ImagePair;
 
 /// Sums of the images of each half.
 #[derive(Clone, Debug, Default)]

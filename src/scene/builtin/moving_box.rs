@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::scene::builtin::shapes;
+use super::shapes;
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Scene};
 
 /// How far occlusion reaches, scene units.
@@ -20,9 +20,6 @@ const TURN: f64 = 0.5;
 const SLIDE: f64 = 0.02;
 /// Frames after which it turns back, from the middle.
 const SLIDE_FRAMES: u32 = 12;
-
-/// Name of the scene.
-pub const NAME: &str = "room";
 
 /// A box that moves, one of a scene's instances.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,9 @@
 //! Images as they are displayed, by which they are compared: lamps and the sun, hundreds of times as bright as all else, would be all that an error of radiance says.
 
-use crate::bench::record::{Row, plain, quantity, without_reference};
+use super::flip::{PIXELS_PER_DEGREE, flip};
+use super::metrics::ImagePair;
 use crate::colour::srgb_encode;
 use crate::error::Result;
-use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
-use crate::measure::metrics::ImagePair;
 use crate::output::tone_map::ToneMap;
 
 /// An image as it is displayed: tone mapped by default, from 0 to 1.
@@ -64,15 +63,6 @@ impl ImageErrors {
             rel_mse: mean(|e| e.rel_mse),
             similarity: all[0].similarity.map(|_| [similarity(0), similarity(1)]),
         })
-    }
-
-    /// Adds them to a row.
-    pub fn add_to(&self, row: &mut Row) {
-        row.exact(quantity::RMSE, self.rmse).exact(quantity::CORRECTED, self.corrected);
-        row.exact(plain("bias", ""), self.bias).exact(plain("FLIP", ""), self.flip);
-        row.exact(plain("rel MSE", ""), self.rel_mse);
-        row.exact(plain("Tanimoto", ""), self.similarity.map(|s| s[0]));
-        row.exact(plain("minimum ratio", ""), self.similarity.map(|s| s[1]));
     }
 
     /// Error over that of plain accumulation. `None` where the references' own errors are all there is.
@@ -188,6 +178,13 @@ impl FlickerMeter {
     }
 }
 
+/// The root of a mean squared error without the error of the reference that it was measured against, which is independent of it; 0 where nothing is left. NaN
+/// stays what it is.
+pub fn without_reference(rmse: f64, reference_rmse: f64) -> f64 {
+    let squares = rmse * rmse - reference_rmse * reference_rmse;
+    if squares < 0.0 { 0.0 } else { squares.sqrt() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,5 +243,12 @@ mod tests {
         assert_eq!(Flicker { after: 64, ..flicker }.is_invisible(), Some(false));
         assert!(FlickerMeter::new(96).result().is_none());
         assert_eq!(FlickerMeter::new(96).after, 64);
+    }
+
+    #[test]
+    fn the_references_own_error_is_taken_off() {
+        assert!((without_reference(0.5, 0.3) - 0.4).abs() < 1e-12);
+        assert_eq!(without_reference(0.1, 0.2), 0.0);
+        assert!(without_reference(f64::NAN, 0.1).is_nan());
     }
 }

@@ -1,7 +1,7 @@
 //! Which pixels a change is about, told from what each of them shows.
 
+use super::Surface;
 use crate::film::camera::CameraRecord;
-use crate::realtime::Surface;
 
 /// A point that moved by less, by the length that occlusion reaches, has not moved.
 const SAME: f64 = 1e-5;
