@@ -148,10 +148,8 @@ mod tests {
         for name in &names {
             record.row("a", "p", "c").exact(super::super::record::plain(name, ""), 1.0);
         }
-        let widths = scene_parts(&record, "a").iter().map(|p| match p {
-            Part::Table(t) => t.columns.len(),
-            _ => 0,
-        });
-        assert_eq!(widths.collect::<Vec<_>>(), [1 + MAX_COLUMNS, 1 + 3]);
+        let parts = scene_parts(&record, "a");
+        let width = |p: &Part| if let Part::Table(t) = p { t.columns.len() } else { 0 };
+        assert_eq!(parts.iter().map(width).collect::<Vec<_>>(), [1 + MAX_COLUMNS, 1 + 3]);
     }
 }
