@@ -16,6 +16,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from bench_table import distinct, find, middle, number, pivot, table, title, value  # noqa: E402
+
 # bytes of an image, and of all of them, that may go into the repository
 LARGEST = 200_000
 ALL = 1_500_000
@@ -34,19 +37,6 @@ def text(path: Path) -> str:
         return path.read_text(errors="replace")
     except OSError:
         return ""
-
-
-def number(x: Any) -> str:
-    """Three digits that count."""
-    if not isinstance(x, (int, float)):
-        return "-"
-    if x == 0 or 0.001 <= abs(x) < 1000:
-        return f"{x:.3g}"
-    return f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.1e}"
-
-
-def table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(r) + " |" for r in rows), ""]
 
 
 def opened(source: Path) -> Path:
@@ -166,54 +156,34 @@ def differences(record: dict[str, Any]) -> str:
     return ", ".join(f"{c.get('name', c.get('channel'))} {number(c.get('rmse'))}" for c in channels if number(c.get("rmse")) != "-") or "-"
 
 
-def milliseconds(cost: Any, clock: str = "device_ms") -> str:
-    """The median, and what 95 % of frames keep within."""
-    return f"{number(cost[clock]['median'])} ({number(cost[clock]['p95'])})" if cost else "-"
+def cell(all: list[dict[str, Any]], contestant: str, quantity: str) -> str:
+    """The value; of times the median, and what 95 % of frames keep within."""
+    for m in all:
+        if m["contestant"] == contestant and m["quantity"] == quantity and not m.get("at"):
+            return f"{number(middle(m))} ({number(m['values']['p95'])})" if isinstance(m["values"], dict) else number(middle(m))
+    return "-"
 
 
-def rmse(record: Any) -> str:
-    return number(((record or {}).get("errors") or {}).get("rmse"))
+def frames(folder: Path) -> list[str]:
+    """Presets in real time: of ambient occlusion, and of light."""
+    records = [load(path) for path in [folder / "bench-ao.json", *sorted(folder.glob("bench-frames*.json"))]]
+    return [line for record in records if record for line in frames_of(record)]
 
 
-def passes(cost: Any) -> str:
-    return ", ".join(f"{p['pass']} {number(p['ms']['median'])}" for p in (cost or {}).get("passes", []))
-
-
-def presets(folder: Path) -> list[str]:
-    record = load(folder / "bench-ao.json")
-    if not record:
-        return []
-    width, height = record["size"]
-    lines = [f"## Presets in real time, {width}x{height}", "", f"Tracer `{record['tracer']}`, {record['frames']} frames; times are the device's, milliseconds a frame: the median, and what 95 % of frames keep within.", ""]
-    for view in record["views"]:
+def frames_of(record: dict[str, Any]) -> list[str]:
+    settings = record["settings"]
+    lines = [f"## Frames in real time, {settings['integrator']}, {settings['size']}", "", f"Tracer `{settings['tracer']}`, {settings['frames']} frames, references of {settings['reference paths']} samples per pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
+    for scene in distinct(m["scene"] for m in record["measurements"]):
         rows = []
-        for r in view["results"]:
-            still, moving = r.get("still") or {}, r.get("moving") or {}
-            curve = still.get("curve") or [None]
-            costs = [still.get("cost"), moving.get("cost")]
-            rows.append([f"`{r['preset']}`", r["primary"], *map(milliseconds, costs), rmse(curve[0]), rmse(curve[-1]), rmse(moving), passes(costs[1] or costs[0])])
-        lines += [f"{view['scene']}, {view['view']}: {view['primitives']:,} primitives", ""]
-        lines += table(["preset", "camera rays", "still", "moving", "RMSE of frame 1", "RMSE settled", "RMSE moving", "passes"], rows)
-    return lines + notes(record)
-
-
-def light(folder: Path) -> list[str]:
-    records = [load(path) for path in sorted(folder.glob("bench-frames*.json"))]
-    return [line for record in records if record for line in frames_of_light(record)]
-
-
-def frames_of_light(record: dict[str, Any]) -> list[str]:
-    width, height = record["size"]
-    lines = [f"## Path tracing in real time, {width}x{height}", "", f"Tracer `{record['tracer']}`, {record['frames']} frames, references of {record['reference_paths']} paths a pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
-    for view in record["views"]:
-        rows = []
-        for r in view["still"]:
-            last = (r["curve"] or [{}])[-1]
-            rows.append([f"`{r['preset']}`", "still", milliseconds(r["cost"]), milliseconds(r["cost"], "wall_ms"), f"{rmse(last)} / {rmse(last.get('plain'))}", passes(r["cost"])])
-        for m in view["motions"]:
-            rows += [[f"`{r['preset']}`", m["motion"], milliseconds(r["cost"]), milliseconds(r["cost"], "wall_ms"), f"{rmse(r)} / {rmse(r.get('plain'))}", passes(r["cost"])] for r in m["results"]]
-        lines += [f"{view['scene']}: {view['primitives']:,} primitives", ""]
-        lines += table(["preset", "motion", "device ms", "wall ms", "RMSE / plain", "passes, ms"], rows)
+        for part in ("still", "still, camera rays", "orbit", "sun", "animation"):
+            own, passes = find(record, scene, part), find(record, scene, f"{part}, passes")
+            for preset in distinct(m["contestant"] for m in own if m["contestant"] != "reference"):
+                errors = " / ".join(number(value(own, preset, name)) for name in ("RMSE", "plain RMSE"))
+                times = ", ".join(f"{m['quantity']} {number(middle(m))}" for m in passes if m["contestant"] == preset)
+                rows.append([f"`{preset}`", part, cell(own, preset, "time"), cell(own, preset, "wall time"), errors, times])
+        about = next((s["about"] for s in record["scenes"] if s["scene"] == scene), "")
+        lines += [f"{scene}: {about}", ""]
+        lines += table(["preset", "part", "device ms", "wall ms", "RMSE / plain", "passes, ms"], rows)
     return lines + notes(record)
 
 
@@ -238,18 +208,19 @@ def rays(folder: Path) -> list[str]:
     record = load(folder / "bench-rays.json")
     if not record:
         return []
-    lines = ["## Rays a second", "", f"Millions, by the device's clock; the median of {record['repeats']}.", ""]
+    lines = ["## Rays a second", "", "Millions, by the device's clock; medians.", ""]
     for scene in record["scenes"]:
-        names = list(dict.fromkeys(r["contestant"] for s in scene["streams"] for r in s["results"]))
-        rows = []
-        for stream in scene["streams"]:
-            by_name = {r["contestant"]: r for r in stream["results"]}
-            rows.append([stream["stream"], *(number((by_name.get(n) or {}).get("device", {}).get("median")) for n in names)])
-        builds = ", ".join(f"{b['contestant']} {number(1000 * b['build_seconds'])} ms" for b in scene["builds"])
-        wrong = sum(c["unexplained"] for c in scene.get("checks", []))
-        checked = sum(c["rays"] for c in scene.get("checks", []))
-        lines += [f"{scene['scene']}: {scene['triangles']:,} triangles; built in {builds}; of {checked:,} answers that were compared, {wrong} unexplained", ""]
-        lines += table(["rays", *(f"`{n}`" for n in names)], rows)
+        name = scene["scene"]
+        own = [m for m in record["measurements"] if m["scene"] == name]
+        rates = [m for m in own if m["quantity"] == "rate"]
+        if not rates:
+            continue
+        streams, kernels = distinct(m["part"] for m in rates), distinct(m["contestant"] for m in rates)
+        rate = {(m["part"], m["contestant"]): number(middle(m)) for m in rates}
+        builds = ", ".join(f"{m['contestant']} {number(1000 * middle(m))} ms" for m in own if m["quantity"] == "build")
+        checked, wrong = (sum(middle(m) for m in own if m["quantity"] == q) for q in ("compared", "unexplained"))
+        lines += [f"{name}: {scene['about']}; built in {builds}; of {checked:,.0f} answers that were compared, {wrong:.0f} unexplained", ""]
+        lines += table(["rays", *(f"`{k}`" for k in kernels)], [[s, *(rate.get((s, k), "-") for k in kernels)] for s in streams])
     return lines + notes(record)
 
 
@@ -257,14 +228,10 @@ def paths(folder: Path) -> list[str]:
     record = load(folder / "bench-path.json")
     if not record:
         return []
-    lines = ["## Path tracing: error against time", "", f"Tracer `{record['tracer']}`.", ""]
-    for scene in record["scenes"]:
-        rows = []
-        for r in scene["results"]:
-            for p in r["points"][-1:]:
-                rows.append([f"`{r['name']}`", str(p["spp"]), number(p["seconds"]["median"]), number(p["rmse"]), number(r.get("mpaths")), number(r.get("mrays"))])
-        lines += [f"{scene['scene']}, {scene['size'][0]}x{scene['size'][1]}", ""]
-        lines += table(["sampling", "samples a pixel", "seconds", "RMSE", "Mpaths/s", "Mrays/s"], rows)
+    settings = record["settings"]
+    lines = ["## Path tracing: error against time", "", f"Tracer `{settings['tracer']}`, {settings['size']}.", ""]
+    for scene in distinct(m["scene"] for m in record["measurements"]):
+        lines += [scene, "", *pivot([m for m in find(record, scene, "images") if not m.get("at")], title)]
     return lines + notes(record)
 
 
@@ -316,7 +283,7 @@ def main() -> None:
     if "cpu" in kinds:
         lines += ["**This is no GPU**: the kit found a driver that runs on the CPU, and did little of everything.", ""]
     lines += [*kept(page), *machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
-    for part in [images, parity, leaks, closed_forms, stress, presets, light, rays, paths]:
+    for part in [images, parity, leaks, closed_forms, stress, frames, rays, paths]:
         lines += part(folder)
     lines += gallery(folder, page)
     page.parent.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,6 @@
 
 use clap::{Args, Subcommand};
 
-use super::ao::BenchAoArgs;
 use super::frames::BenchFramesArgs;
 use super::path::BenchPathArgs;
 use super::rays::BenchRaysArgs;
@@ -21,8 +20,8 @@ pub struct BenchArgs {
 pub enum Benchmark {
     /// Ray tracing: rays per second of each tracer, kernel and peer, by ray stream and scene
     Rays(Box<BenchRaysArgs>),
-    /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
-    Ao(Box<BenchAoArgs>),
+    /// Real-time ambient occlusion: `frames --integrator ao`
+    Ao(Box<BenchFramesArgs>),
     /// Frames in real time of any integrator: time and error of each preset beside plain accumulation at equal time, by scene and kind of motion
     Frames(Box<BenchFramesArgs>),
     /// Path tracing: error over time of each sampling strategy and peer, by scene

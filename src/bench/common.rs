@@ -8,11 +8,8 @@ use clap::{Args, ValueHint};
 use serde::Serialize;
 
 use super::baseline::BaselineReport;
-use super::page;
-use super::plot;
-use super::plot::picture::{self, PlotFormat};
-use super::record::{BenchKind, BenchRecord};
-use super::report::ReportedRecord;
+use super::page::{self, ReportedRecord};
+use super::record::Record;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
@@ -54,7 +51,7 @@ pub struct OutputArgs {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
     pub json: Option<Option<PathBuf>>,
     /// Also plot the results
-    #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.svg", value_hint = ValueHint::FilePath)]
     pub plot: Option<PathBuf>,
     /// Write a report into this folder: a page that needs no network, with charts, tables, host and notes
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -98,15 +95,12 @@ impl OutputArgs {
     }
 
     fn check_writable(&self, plan: &mut FilePlan) -> Result<()> {
-        self.plot.as_ref().map_or(Ok(()), |path| PlotFormat::of(path).map(drop))?;
+        self.plot.as_ref().map_or(Ok(()), |path| report::check_svg_name("--plot", path))?;
         self.html.as_ref().map_or(Ok(()), |dir| plan.make_folder(dir))?;
         self.json_file().into_iter().chain(&self.plot).try_for_each(|path| files::check_writable(path))
     }
 
     /// Writes the JSON record, if a file is given for it.
-    ///
-    /// # Errors
-    /// [`Error::Output`].
     pub fn write_json(&self, value: &impl Serialize) -> Result<()> {
         let Some(path) = self.json_file() else { return Ok(()) };
         let text = serde_json::to_string_pretty(value)
@@ -115,11 +109,8 @@ impl OutputArgs {
     }
 
     /// Writes the plot and the page of records, if they are asked for; a plot that cannot be written does not prevent the page. Returns the address of the page.
-    ///
-    /// # Errors
-    /// Those of [`picture::write`] and of [`report::write`], the first of them.
     pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
-        let plot = self.plot.as_ref().map_or(Ok(()), |path| picture::write(path, &plot::of_all(records)));
+        let plot = self.plot.as_ref().map_or(Ok(()), |path| page::write_plot(path, records));
         let write =
             |dir: &PathBuf| report::write(dir, &page::page(records, &command_line())).map(|index| report::address(&index));
         let address = self.html.as_ref().map(write).transpose();
@@ -127,14 +118,23 @@ impl OutputArgs {
     }
 }
 
-/// A record as JSON: with the benchmark that it is of, and how it compares with its baseline.
+/// Prints the address of a page, if one was written. Returns it, and what went wrong.
+pub fn show_address(pictures: Result<Option<String>>, console: Console) -> (Option<String>, Result<()>) {
+    match pictures {
+        Ok(address) => {
+            let shown = address.as_ref().map_or(Ok(()), |a| console.line(&format!("report: {a}")));
+            (address, shown)
+        }
+        Err(e) => (None, Err(e)),
+    }
+}
+
+/// A record as JSON, with how it compares with its baseline.
 #[derive(Serialize)]
-pub struct JsonRecord<'a, R> {
-    /// Which benchmark.
-    pub benchmark: BenchKind,
+pub struct JsonRecord<'a> {
     /// What was measured.
     #[serde(flatten)]
-    pub record: &'a R,
+    pub record: &'a Record,
     /// The comparison with an earlier record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<&'a BaselineReport>,
@@ -144,15 +144,7 @@ pub struct JsonRecord<'a, R> {
 }
 
 impl CommonArgs {
-    /// The console with these options.
-    pub fn console(&self) -> Console {
-        self.outputs.console()
-    }
-
     /// Checks the arguments before anything that takes long. The plan has made the folder of the report.
-    ///
-    /// # Errors
-    /// Those of [`OutputArgs::check`], for the CSV table too.
     pub fn check(&self) -> Result<FilePlan> {
         let mut plan = self.plan();
         plan.check()?;
@@ -186,10 +178,7 @@ impl CommonArgs {
     }
 
     /// Writes the JSON record and the CSV table, if they are asked for; one that cannot be written does not prevent the other.
-    ///
-    /// # Errors
-    /// The first error.
-    pub fn write_tables<R: BenchRecord>(&self, json: &JsonRecord<R>) -> Result<()> {
+    pub fn write_tables(&self, json: &JsonRecord) -> Result<()> {
         let write_csv = |path: &Path| {
             let mut text = Vec::new();
             json.record.write_csv(&mut text).map_err(|e| Error::write(path, &std::io::Error::other(e)))?;

@@ -17,9 +17,6 @@ pub struct BenchDevice {
 
 impl BenchDevice {
     /// Opens the device that the options name.
-    ///
-    /// # Errors
-    /// Those of [`Device::open`].
     pub fn open(args: &CommonArgs) -> Result<Self> {
         let options = Options { device: args.device.clone(), validation: args.validation, ..Default::default() };
         Ok(Self { device: Device::open(&options)? })
@@ -42,9 +39,6 @@ impl BenchDevice {
     }
 
     /// Builds what traces a scene.
-    ///
-    /// # Errors
-    /// Those of [`Tracer::with_build`].
     pub fn tracer(
         &self,
         flat: &FlatScene,

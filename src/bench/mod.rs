@@ -1,26 +1,22 @@
 //! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
 //! real-time frames and its path tracing are.
 //!
-//! Each benchmark is a folder: `rays`, `ao`, `frames`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
-//! compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the well-known scenes,
-//! `session` is a run under way, and `device` alone opens the device and builds tracers.
+//! Each benchmark is a folder: `rays`, `frames`, `path`. What they share is beside them: `record` is the list of measurements that all of them make, `table`, `chart` and
+//! `page` show it, `baseline` compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the
+//! well-known scenes, `session` is a run under way, and `device` alone opens the device and builds tracers.
 
-mod ao;
 mod args;
 mod baseline;
+mod chart;
 mod common;
 mod device;
-mod frame_log;
 mod frames;
-mod lag;
-mod masks;
 mod page;
 mod path;
 mod peers;
-pub(crate) mod plot;
+mod quantity;
 mod rays;
 mod record;
-mod reference;
 mod report;
 mod scenes;
 mod session;
@@ -31,13 +27,10 @@ pub use args::BenchArgs;
 use crate::terminal::console::Failure;
 
 /// Runs a benchmark, or reports what was measured.
-///
-/// # Errors
-/// Those of the benchmark; what was measured before is written all the same.
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     match &args.benchmark {
         args::Benchmark::Rays(args) => rays::run(args),
-        args::Benchmark::Ao(args) => ao::run(args),
+        args::Benchmark::Ao(args) => frames::run(&args.of_ambient_occlusion()),
         args::Benchmark::Path(args) => path::run(args),
         args::Benchmark::Frames(args) => frames::run(args),
         args::Benchmark::Report(args) => report::run(args),

@@ -1,18 +1,15 @@
 //! Which scenes benchmarks measure unless others are named: built-in ones, and well-known files where these are there.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::film::camera::Choice;
-use crate::scene::{Camera, EnvironmentMap, builtin, load};
+use crate::scene::{Camera, Environment, EnvironmentMap, builtin, load};
 
 /// The map with a sun in it, below the folder of shared scenes.
 const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";
-/// Pixels of our own map: a texel is 0.7 degrees, about the sun.
-const OWN_MAP: [u32; 2] = [512, 256];
 
 /// A perspective camera.
 #[derive(Clone, Copy, Debug)]
@@ -166,9 +163,6 @@ impl SceneList {
 }
 
 /// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
-///
-/// # Errors
-/// Those of [`load::load`]; [`Error::Usage`] for a JSON file, which is no scene: whoever names one wants the record there.
 pub fn check_exists(source: &str) -> Result<()> {
     if Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
@@ -181,53 +175,39 @@ pub fn check_exists(source: &str) -> Result<()> {
     load::load(source).map(drop)
 }
 
+/// Name of a scene in tables: well-known scenes have that of their file.
+pub fn table_name(known: &[&'static WellKnownScene], source: &str) -> String {
+    let stem = WellKnownScene::find(known, source).and_then(|_| Path::new(source).file_stem());
+    stem.map_or_else(|| source.to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// An environment in words; one that is black as `black`.
+pub fn environment_text(environment: &Environment, black: &str) -> String {
+    match environment {
+        Environment::Black => black.to_owned(),
+        Environment::Uniform(c) => format!("constant environment {},{},{}", c.x, c.y, c.z),
+        Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
+    }
+}
+
 /// Where the well-known scenes are.
 pub fn shared_folder() -> PathBuf {
     std::env::var_os("SKYLIT_SHARED_SCENES").map_or_else(|| Path::new("../shared/scenes").to_owned(), PathBuf::from)
 }
 
 /// An environment map with a sun: the one that is given, the shared one where it is there and `quick` is not wanted, or our own.
-///
-/// # Errors
-/// Those of [`load::load_environment`].
 pub fn sun_map(given: Option<&Path>, quick: bool) -> Result<EnvironmentMap> {
     let shared = shared_folder().join(SUN_MAP);
     match given {
         Some(path) => load::load_environment(path),
         None if shared.is_file() && !quick => load::load_environment(&shared),
-        None => Ok(own_map()),
+        None => Ok(builtin::sun_map::sun_map()),
     }
-}
-
-/// A sky of our own: blue above, brown below, and a sun that is 10^4 times as bright as both.
-fn own_map() -> EnvironmentMap {
-    let [width, height] = OWN_MAP;
-    let sun = DVec3::new(0.5, 0.6, 0.62).normalize();
-    let texel = |k: u32| {
-        let (x, y) = (f64::from(k % width) + 0.5, f64::from(k / width) + 0.5);
-        let (phi, theta) = (std::f64::consts::TAU * (x / f64::from(width) - 0.5), std::f64::consts::PI * y / f64::from(height));
-        let d = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-        let sky = if d.y > 0.0 { Vec3::new(0.5, 0.7, 1.0) } else { Vec3::new(0.3, 0.25, 0.2) };
-        // half a degree across, and no less than a texel
-        if d.dot(sun) > 0.4f64.to_radians().cos() { Vec3::new(1.0e4, 9.0e3, 7.0e3) } else { sky }
-    };
-    let radiance: Arc<[Vec3]> = (0..width * height).map(texel).collect();
-    EnvironmentMap { name: "own sun map".into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn our_own_map_has_one_sun() {
-        let map = own_map();
-        let bright = map.radiance.iter().filter(|r| r.x > 100.0).count();
-        assert!((1..=4).contains(&bright), "{bright} texels of sun");
-        // seen upwards
-        let at = map.radiance.iter().position(|r| r.x > 100.0).unwrap();
-        assert!(at / (OWN_MAP[0] as usize) < OWN_MAP[1] as usize / 2);
-    }
 
     #[test]
     fn well_known_scenes_by_folder_and_name() {

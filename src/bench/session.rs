@@ -3,13 +3,13 @@
 use std::time::Instant;
 
 use super::baseline::{Baseline, BaselineReport};
-use super::common::{CommonArgs, JsonRecord};
+use super::common::{CommonArgs, JsonRecord, show_address};
 use super::device::BenchDevice;
+use super::page::ReportedRecord;
 use super::peers::file::PeerSpec;
 use super::peers::process::{Peer, PeerError};
-use super::record::BenchRecord;
-use super::report::{ReportedRecord, show_address};
-use super::table::{self, Block};
+use super::record::Record;
+use super::table;
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ use crate::terminal::warnings::warnings_of;
 const STEPS: u64 = 1000;
 
 /// A running benchmark, with its arguments and its record.
-pub struct Session<'a, A, R> {
+pub struct Session<'a, A> {
     /// Arguments of this benchmark.
     pub args: &'a A,
     /// The device.
@@ -32,7 +32,7 @@ pub struct Session<'a, A, R> {
     /// Progress bar and Ctrl-C of long work.
     pub control: ProgressControl,
     /// The results so far.
-    pub record: R,
+    pub record: Record,
     common: &'a CommonArgs,
     console: Console,
     baseline: Option<Baseline>,
@@ -45,21 +45,18 @@ pub struct Session<'a, A, R> {
     _plan: FilePlan,
 }
 
-impl<'a, A, R: BenchRecord> Session<'a, A, R> {
+impl<'a, A> Session<'a, A> {
     /// Opens the device. `record` makes the record that is filled: it has the settings already, which have to be those of the baseline.
-    ///
-    /// # Errors
-    /// Those of [`CommonArgs::check`], of [`Baseline::read`] and [`Baseline::check`], and of [`BenchDevice::open`].
-    pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> R) -> Result<Self> {
+    pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> Record) -> Result<Self> {
         let start = Instant::now();
         let plan = common.check()?;
         let baseline = common.baseline.as_deref().map(Baseline::read).transpose()?;
         interrupt::install();
-        let console = common.console();
+        let console = common.outputs.console();
         let device = BenchDevice::open(common)?;
         let control = ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false };
         let record = record(&device);
-        baseline.as_ref().map_or(Ok(()), |b| b.check(&record.snapshot()))?;
+        baseline.as_ref().map_or(Ok(()), |b| b.check(&record))?;
         Ok(Self {
             args,
             device,
@@ -77,9 +74,6 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
     }
 
     /// Starts peers; those that do not start are left out with a note, and so are all where `specs` says why there are none.
-    ///
-    /// # Errors
-    /// Those of our own side; Ctrl-C.
     pub fn start_peers(&mut self, specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
         let specs = match specs {
             Ok(specs) => specs,
@@ -137,7 +131,7 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
     /// Warns, and keeps the warning in the record.
     pub fn note(&mut self, text: String) {
         self.control.progress.suspend(|| self.console.warning(&text));
-        self.record.completeness().notes.push(text);
+        self.record.notes.push(text);
     }
 
     /// Notes what loading a scene warned of.
@@ -155,15 +149,22 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
 
     /// Records that the time limit took something.
     pub fn stop_early(&mut self) {
-        self.record.completeness().stopped_early = true;
+        self.record.stopped_early = true;
     }
 
-    /// Shows a part of the result.
-    ///
-    /// # Errors
-    /// When stdout cannot be written.
-    pub fn show(&self, blocks: &[Block]) -> Result<()> {
-        self.control.progress.suspend(|| table::lines(blocks).iter().try_for_each(|line| self.console.line(line)))
+    /// Shows what the run is of: host, settings and peers.
+    pub fn show_title(&self) -> Result<()> {
+        self.show(&[table::title(&self.record)])
+    }
+
+    /// Shows what is known of a scene, if anything was measured of it.
+    pub fn show_scene(&self, scene: &str) -> Result<()> {
+        let is_measured = self.record.measurements.iter().any(|m| m.scene == scene);
+        if is_measured { self.show(&table::scene_lines(&self.record, scene)) } else { Ok(()) }
+    }
+
+    fn show(&self, lines: &[String]) -> Result<()> {
+        self.control.progress.suspend(|| lines.iter().try_for_each(|line| self.console.line(line)))
     }
 
     /// Says what is done from here on.
@@ -195,39 +196,34 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
 
     /// Writes and prints what was measured, whatever went wrong, and compares it with the baseline. `scenes_named`: a scene that failed fails the run even if another one did
     /// not; `checked`: what follows from the record itself.
-    ///
-    /// # Errors
-    /// The first that went wrong.
     pub fn finish(self, measured: Result<()>, scenes_named: bool, checked: Result<()>) -> Result<(), Failure> {
-        let Self { mut record, device, common, console, failure, control, peers, baseline, .. } = self;
+        let Self { record, device, common, console, failure, control, peers, baseline, .. } = self;
         // before anything is printed
         drop((control, peers));
         let valid = device.close(measured.is_ok());
-        let compared = baseline.filter(|_| !record.is_empty()).map(|b| b.compare(&record.snapshot()));
+        let compared = baseline.filter(|_| !record.is_empty()).map(|b| b.compare(&record));
         let shown = compared
             .as_ref()
-            .map_or(Ok(()), |report| table::lines(&report.blocks()).iter().try_for_each(|line| console.line(line)));
+            .map_or(Ok(()), |report| table::lines(&report.parts()).iter().try_for_each(|line| console.line(line)));
         if let Some(report) = &compared {
             report.warnings.iter().for_each(|w| console.warning(w));
         }
         let complete = match failure {
             Some(e) if record.is_empty() || scenes_named => Err(e),
             _ if record.is_empty() => {
-                let why = record.completeness().notes.last().map_or("no scene", String::as_str);
+                let why = record.notes.last().map_or("no scene", String::as_str);
                 Err(Error::Usage(format!("nothing was measured: {why}")))
             }
             _ => Ok(()),
         };
-        let saved = record.saved();
-        let kind = saved.kind();
         let file = common.outputs.json_file().cloned().unwrap_or_else(|| "this run".into());
-        let reported = ReportedRecord { file, record: saved, baseline: compared };
-        let pictures =
-            if record.is_empty() { Ok(None) } else { common.outputs.write_pictures(std::slice::from_ref(&reported)) };
+        let is_empty = record.is_empty();
+        let reported = ReportedRecord { file, record, baseline: compared };
+        let pictures = if is_empty { Ok(None) } else { common.outputs.write_pictures(std::slice::from_ref(&reported)) };
         let (report, drawn) = show_address(pictures, console);
         let baseline = reported.baseline.as_ref();
-        let json = JsonRecord { benchmark: kind, record: &record, baseline, report };
-        let written = if record.is_empty() { Ok(()) } else { common.write_tables(&json).and(drawn) };
+        let json = JsonRecord { record: &reported.record, baseline, report };
+        let written = if is_empty { Ok(()) } else { common.write_tables(&json).and(drawn) };
         let holds = baseline.map_or(Ok(()), BaselineReport::verdict);
         console.close(&json, measured.and(valid).and(written).and(complete).and(checked).and(shown).and(holds))
     }

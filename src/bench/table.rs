@@ -1,103 +1,155 @@
-//! Tables, for the terminal and for pages.
+//! Measurements as tables: a table for each part of a scene, a row a contestant, a column a quantity or a place along an axis. In the terminal they are text.
 
-/// A part of what a benchmark says.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Block {
-    /// A line of its own; an empty one is a gap in the terminal.
-    Line(String),
-    /// A table whose first row has the titles, with so many columns to the left and the others to the right.
-    Table {
-        /// What it shows; pages have it above the table, the terminal does not.
-        title: &'static str,
-        /// All rows.
-        rows: Vec<Vec<String>>,
-        /// Columns to the left.
-        left: usize,
-    },
+use super::chart::distinct;
+use super::record::{Measurement, Record};
+use crate::measure::regression::Values;
+use crate::report::{Cell, Part, Row, Table, format_number};
+
+/// Columns of a table at most; what has more goes on below.
+const MAX_COLUMNS: usize = 9;
+/// Places along an axis that a table shows at most.
+const MAX_PLACES: usize = 8;
+
+/// Device, settings and peers.
+pub fn title(record: &Record) -> String {
+    let settings = record.settings.iter().map(|(name, value)| format!(", {name} {value}")).collect::<String>();
+    let peers = record.peers.iter().map(|p| format!("; beside {p}")).collect::<String>();
+    let name = record.benchmark.name();
+    format!("{}{settings}{peers}; docs/bench-{name}.md explains the columns", record.host.line())
 }
 
-impl Block {
-    /// A line.
-    pub fn line(text: impl Into<String>) -> Self {
-        Self::Line(text.into())
-    }
-
-    /// A gap.
-    pub fn gap() -> Self {
-        Self::Line(String::new())
-    }
-}
-
-/// Blocks as lines of text.
-pub fn lines(blocks: &[Block]) -> Vec<String> {
-    let of = |block: &Block| match block {
-        Block::Line(text) => vec![text.clone()],
-        Block::Table { rows, left, .. } => indented(rows, *left).collect(),
-    };
-    blocks.iter().flat_map(of).collect()
-}
-
-/// Lines of a table: the first `left` columns to the left, the others to the right.
-fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width: Vec<usize> =
-        (0..columns).map(|c| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0)).collect();
-    let cell = |(c, text): (usize, &String)| {
-        let w = width[c];
-        if c < left { format!("{text:w$}") } else { format!("{text:>w$}") }
-    };
-    rows.iter().map(|r| r.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()).collect()
-}
-
-/// The same, two spaces to the right.
-fn indented(rows: &[Vec<String>], left: usize) -> impl Iterator<Item = String> {
-    align(rows, left).into_iter().map(|line| format!("  {line}"))
-}
-
-/// A row of column titles.
-pub fn header(titles: &[&str]) -> Vec<String> {
-    titles.iter().map(|t| (*t).to_owned()).collect()
-}
-
-/// What is known, or a dash.
-pub fn optional<T>(x: Option<T>, show: impl Fn(T) -> String) -> String {
-    x.map_or_else(|| "-".to_owned(), show)
-}
-
-/// Three significant digits; no more than are before the point.
-pub fn number(x: f64) -> String {
-    match x {
-        x if x >= 100.0 => format!("{x:.0}"),
-        x if x >= 10.0 => format!("{x:.1}"),
-        x => format!("{x:.2}"),
-    }
-}
-
-/// With separators between thousands.
-pub fn thousands(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (k, c) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            out.push(',');
+/// What is known of a scene: what it is, a table or more for each part, and what they say.
+pub fn scene_parts(record: &Record, scene: &str) -> Vec<Part> {
+    let here: Vec<&Measurement> = record.measurements.iter().filter(|m| m.scene == scene).collect();
+    let described = record.scenes.iter().find(|s| s.scene == scene);
+    let about = described.map(|s| &s.about).filter(|about| !about.is_empty());
+    let mut parts: Vec<Part> = about.map(|about| Part::Text(about.clone())).into_iter().collect();
+    for part in distinct(here.iter().map(|m| m.part.as_str())) {
+        let (curves, singles): (Vec<&Measurement>, Vec<&Measurement>) =
+            here.iter().copied().filter(|m| m.part == part).partition(|m| m.along().is_some());
+        let columns = distinct(singles.iter().map(|m| m.title()));
+        for titles in columns.chunks(MAX_COLUMNS) {
+            parts.push(table(part, titles, &singles, |m| m.title()));
         }
-        out.push(c);
+        for (title, axis) in distinct(curves.iter().filter_map(|m| Some((m.title(), m.along()?.axis.as_str())))) {
+            let own: Vec<&Measurement> =
+                curves.iter().copied().filter(|m| m.title() == title && m.along().is_some_and(|at| at.axis == axis)).collect();
+            let place = |m: &Measurement| m.along().map_or_else(String::new, |at| at.value.to_string());
+            let places = thinned(distinct(own.iter().map(|m| place(m))));
+            parts.push(table(&format!("{part}: {title} by {axis}"), &places, &own, place));
+        }
     }
-    out
+    parts.extend(described.iter().flat_map(|s| &s.remarks).map(|line| Part::Text(line.clone())));
+    parts
+}
+
+/// As many values as a table has columns for, the first and the last among them.
+fn thinned(values: Vec<String>) -> Vec<String> {
+    let last = values.len().saturating_sub(1);
+    if last < MAX_PLACES {
+        return values;
+    }
+    let kept: Vec<usize> = (0..MAX_PLACES).map(|k| k * last / (MAX_PLACES - 1)).collect();
+    values.into_iter().enumerate().filter(|(k, _)| kept.contains(k)).map(|(_, v)| v).collect()
+}
+
+/// A row for each contestant that has any of the columns.
+fn table(title: &str, titles: &[String], all: &[&Measurement], column_of: impl Fn(&Measurement) -> String) -> Part {
+    let heads: Vec<&str> = std::iter::once(title).chain(titles.iter().map(String::as_str)).collect();
+    let mut table = Table::new(&heads).titled(title);
+    for contestant in distinct(all.iter().map(|m| m.contestant.as_str())) {
+        let find = |title: &String| all.iter().find(|m| m.contestant == contestant && column_of(m) == *title);
+        let found: Vec<Option<&&Measurement>> = titles.iter().map(find).collect();
+        if found.iter().all(Option::is_none) {
+            continue;
+        }
+        let cells = found.into_iter().map(|m| m.map_or_else(|| Cell::from("-"), |m| cell(&m.values)));
+        table = table.row(Row::new(std::iter::once(Cell::from(contestant)).chain(cells)));
+    }
+    Part::Table(table)
+}
+
+/// A number; of repeated measurements the median and the 95th percentile.
+fn cell(values: &Values) -> Cell {
+    let middle = values.middle();
+    if !middle.is_finite() {
+        return Cell::from("-");
+    }
+    match values {
+        Values::Repeated(p) if p.count > 1 => {
+            Cell::number(middle, format!("{}..{}", format_number(middle), format_number(p.p95)))
+        }
+        _ => Cell::number(middle, format_number(middle)),
+    }
+}
+
+/// Parts as lines of text; charts have none.
+pub fn lines(parts: &[Part]) -> Vec<String> {
+    let lines_of = |part: &Part| match part {
+        Part::Text(text) => vec![format!("  {text}")],
+        Part::Table(table) => table.lines().into_iter().map(|line| format!("  {line}")).chain([String::new()]).collect(),
+        Part::Chart(_) | Part::Images(_) => Vec::new(),
+    };
+    parts.iter().flat_map(lines_of).collect()
+}
+
+/// A scene with its name above, as lines of text.
+pub fn scene_lines(record: &Record, scene: &str) -> Vec<String> {
+    [vec![String::new(), format!("{scene}:")], lines(&scene_parts(record, scene))].concat()
+}
+
+/// All of a record, as lines of text.
+pub fn record_lines(record: &Record) -> Vec<String> {
+    let mut all = vec![title(record)];
+    all.extend(scene_names(record).into_iter().flat_map(|scene| scene_lines(record, scene)));
+    all.extend(record.stopped_early.then(|| "the time limit ended it early".to_owned()));
+    all.extend(record.notes.iter().map(|note| format!("note: {note}")));
+    all
+}
+
+/// Scenes in the order in which they were measured.
+pub fn scene_names(record: &Record) -> Vec<&str> {
+    let described = record.scenes.iter().map(|s| s.scene.as_str());
+    distinct(described.chain(record.measurements.iter().map(|m| m.scene.as_str())))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::record::{FRAME, quantity};
     use super::*;
+    use crate::measure::stats::Percentiles;
 
     #[test]
-    fn columns_line_up() {
-        let row = |a: &str, b: &str| vec![a.to_owned(), b.to_owned()];
-        assert_eq!(align(&[row("name", "n"), row("a", "1000")], 1), ["name     n", "a     1000"]);
+    fn a_table_has_a_row_a_contestant_and_a_column_a_quantity() {
+        let mut record = Record::default();
+        record.row("a", "still", "fast").repeated(quantity::FRAME_TIME, Percentiles::of(&[1.0, 2.0, 4.0]));
+        let mut row = record.row("a", "still", "quality");
+        row.exact(quantity::RMSE, 0.25).exact(quantity::FLICKER, f64::INFINITY);
+        (1..=20).for_each(|k| {
+            row.at(FRAME, f64::from(k)).exact(quantity::RMSE, 1.0 / f64::from(k));
+        });
+        record.scene("a").about = "12 primitives".into();
+        record.scene("a").remarks.push("quality is exact: yes".into());
+        let lines = scene_lines(&record, "a");
+        assert_eq!(lines[..3], ["", "a:", "  12 primitives"]);
+        assert_eq!(lines[3], "  still        time, ms    RMSE  flicker");
+        assert_eq!(lines[4], "  fast     2.000..4.000       -        -");
+        assert_eq!(lines[5], "  quality             -  0.2500        -");
+        assert!(lines[7].starts_with("  still: RMSE by frame") && lines[7].ends_with("20"), "{lines:?}");
+        assert_eq!(lines[8].split_whitespace().count(), 1 + MAX_PLACES);
+        assert_eq!(lines.last().unwrap(), "  quality is exact: yes");
+        assert_eq!(scene_names(&record), ["a"]);
     }
 
     #[test]
-    fn thousands_are_apart() {
-        assert_eq!([0, 999, 1000, 25_000_000].map(thousands), ["0", "999", "1,000", "25,000,000"]);
+    fn wide_tables_go_on_below() {
+        let mut record = Record::default();
+        let names: Vec<String> = (0..12).map(|k| format!("q{k}")).collect();
+        for name in &names {
+            record.row("a", "p", "c").exact(super::super::record::plain(name, ""), 1.0);
+        }
+        let parts = scene_parts(&record, "a");
+        let width = |p: &Part| if let Part::Table(t) = p { t.columns.len() } else { 0 };
+        assert_eq!(parts.iter().map(width).collect::<Vec<_>>(), [1 + MAX_COLUMNS, 1 + 3]);
     }
 }

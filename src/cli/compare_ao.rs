@@ -68,7 +68,7 @@ pub struct AoVsPathArgs {
     html: Option<PathBuf>,
     /// Also plot the error over the radius, a line per falloff
     #[cfg(feature = "bench")]
-    #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.svg", value_hint = ValueHint::FilePath)]
     plot: Option<PathBuf>,
     #[command(flatten)]
     load: LoadArgs,
@@ -300,31 +300,28 @@ fn interval([low, high]: [Option<f64>; 2]) -> String {
 mod plot {
     use std::path::Path;
 
-    use super::{FitRecord, Report, Result, page, significant};
-    use crate::bench::plot::panel::{Panel, Plot, Point, Series};
-    use crate::bench::plot::picture::{self, PlotFormat};
+    use super::{FitRecord, Report, Result, page, report, significant};
     use crate::integrators::path::ambient::EnvironmentLight;
+    use crate::report::{Axis, Chart, Point, Series};
 
     /// Checks before anything is rendered that the plot can be written.
     pub fn check(path: &Path) -> Result<()> {
-        PlotFormat::of(path)?;
+        report::check_svg_name("--plot", path)?;
         crate::files::check_writable(path)
     }
 
-    /// Draws a panel per fit.
-    pub fn write(path: &Path, report: &Report) -> Result<()> {
-        let plot = Plot {
-            title: format!("{}: ambient occlusion against path tracing", page::scene_name(&report.scene)),
-            subtitle: format!(
-                "{}x{}, {} paths and {} occlusion rays per pixel; the ambient colour is the best one everywhere",
-                report.size[0], report.size[1], report.spp, report.ao_samples
-            ),
-            groups: report.path.iter().chain(&report.sky).map(|fit| vec![panel(fit)]).collect(),
-        };
-        picture::write(path, &plot)
+    /// Draws a chart per fit.
+    pub fn write(path: &Path, found: &Report) -> Result<()> {
+        let title = format!("{}: ambient occlusion against path tracing", page::scene_name(&found.scene));
+        let subtitle = format!(
+            "{}x{}, {} paths and {} occlusion rays per pixel; the ambient colour is the best one everywhere",
+            found.size[0], found.size[1], found.spp, found.ao_samples
+        );
+        let charts: Vec<Chart> = found.path.iter().chain(&found.sky).map(chart).collect();
+        report::write_svg(path, &title, &subtitle, &charts)
     }
 
-    fn panel(fit: &FitRecord) -> Panel {
+    fn chart(fit: &FitRecord) -> Chart {
         let title = match fit.environment_light {
             Some(EnvironmentLight::Ambient) => "path tracing; ambient: environment and bounces",
             Some(EnvironmentLight::Traced) => "path tracing; ambient: bounces",
@@ -337,9 +334,14 @@ mod plot {
             };
             // an infinite radius has no place on a logarithmic axis
             let points = curve.radii.iter().zip(&curve.rmse).filter_map(|(r, e)| Some(Point::from(((*r)?, *e))));
-            Series::curve(&name, points)
+            Series { name, points: points.collect(), ..Series::default() }
         });
-        let caption = "Error by the radius of ambient occlusion.".into();
-        Panel { title: title.into(), caption, x: "AO radius, scene units".into(), y: "RMSE".into(), series: series.collect() }
+        Chart {
+            title: title.into(),
+            caption: "Error by the radius of ambient occlusion.".into(),
+            x: Axis::logarithmic("AO radius, scene units"),
+            y: Axis::logarithmic("RMSE"),
+            series: series.collect(),
+        }
     }
 }

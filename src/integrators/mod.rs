@@ -1,13 +1,14 @@
 //! Integrators of stills, one folder each. [`ALL`] is the only list of them; the command line, the renderer and reports
 //! access an integrator through the trait [`Integrator`].
 //!
-//! [`aov`] renders auxiliary outputs, and [`rays`] traces a given set of rays.
+//! [`aov`] renders auxiliary outputs, [`rays`] traces a given set of rays, and [`ray_sets`] makes those of an image.
 
 mod all;
 pub mod ao;
 pub mod aov;
 pub mod lighting;
 pub mod path;
+pub mod ray_sets;
 pub mod rays;
 
 use std::sync::Arc;

@@ -27,6 +27,7 @@ mod seen;
 pub mod sequence;
 pub mod settings;
 mod signals;
+pub mod surface_masks;
 
 use glam::DMat3;
 

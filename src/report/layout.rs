@@ -15,21 +15,23 @@ const NAME_WIDTH: f64 = 8.6;
 const NAME_HEIGHT: f64 = 15.0;
 /// Magnitude of what axes hold at most, and its inverse, below which numbers are 0: beyond it, quotients of an axis' ends would be no numbers any more.
 const MAX_MAGNITUDE: f64 = 1e100;
+/// Logarithmic axes of less than this ratio have numbers at even distances.
+const MIN_DECADE: f64 = 6.0;
 /// Different colours of series; more than these repeat.
 pub const COLORS: usize = 8;
 
 /// A chart in pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChartLayout {
-    title: String,
+    pub(super) title: String,
     caption: String,
-    size: [f64; 2],
-    area: [f64; 4],
+    pub(super) size: [f64; 2],
+    pub(super) area: [f64; 4],
     x_label: String,
     y_label: String,
     x_ticks: Vec<Tick>,
     y_ticks: Vec<Tick>,
-    series: Vec<SeriesLayout>,
+    pub(super) series: Vec<SeriesLayout>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -39,15 +41,16 @@ struct Tick {
     text: String,
 }
 
+/// A series in pixels.
 #[derive(Clone, Debug, Serialize)]
-struct SeriesLayout {
-    name: String,
-    color: usize,
+pub struct SeriesLayout {
+    pub(super) name: String,
+    pub(super) color: usize,
     /// Drawn in grey.
-    is_neutral: bool,
-    is_dashed: bool,
+    pub(super) is_neutral: bool,
+    pub(super) is_dashed: bool,
     /// The legend names it: its points have no names of their own, and no series before it has its name.
-    is_in_legend: bool,
+    pub(super) is_in_legend: bool,
     /// Points of the line that joins the points, as SVG has them; empty for none.
     line: String,
     points: Vec<PointLayout>,
@@ -115,13 +118,14 @@ impl Span {
         let tick = |v: f64, text: String| Tick { at: self.position(v), text };
         let [lo, hi] = self.range;
         match self.scale {
-            Scale::Linear => {
+            // a short piece of a logarithmic axis is all but linear
+            _ if self.scale == Scale::Linear || hi / lo < MIN_DECADE => {
                 let step = round_step((hi - lo) / 6.0);
                 let first = (lo / step - 1e-9).ceil() as i64;
                 let last = (hi / step + 1e-9).floor() as i64;
                 (first..=last).map(|k| tick(k as f64 * step, short(k as f64 * step))).collect()
             }
-            Scale::Logarithmic => {
+            _ => {
                 let decades = (lo.log10().floor() as i32)..=(hi.log10().ceil() as i32);
                 let few = hi / lo < 300.0;
                 let tens = (hi / lo).log10() > 8.0;

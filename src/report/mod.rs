@@ -23,12 +23,15 @@ mod images;
 pub mod labels;
 mod layout;
 mod page;
+pub mod pareto;
+mod svg;
 mod table;
 
 pub use chart::{Axis, Chart, Mark, Point, Scale, Series};
 pub use images::{ComparedImage, ImageComparison};
 pub use page::{address, write};
-pub use table::{Cell, Column, Row, Status, Table, format_number};
+pub use svg::{check_svg_name, write_svg};
+pub use table::{Cell, Column, Row, Status, Table, format_number, thousands};
 
 /// A page of a report.
 #[derive(Clone, Debug, Default)]

@@ -18,10 +18,12 @@ use crate::files::write_atomically;
 use crate::output::palette;
 
 /// Templates by the names that they call each other.
-const TEMPLATES: [(&str, &str); 5] = [
+const TEMPLATES: [(&str, &str); 7] = [
     ("page.html", include_str!("templates/page.html")),
     ("table.html", include_str!("templates/table.html")),
     ("chart.html", include_str!("templates/chart.html")),
+    ("marks.xml", include_str!("templates/marks.xml")),
+    ("plot.xml", include_str!("templates/plot.xml")),
     ("images.html", include_str!("templates/images.html")),
     ("data.js", include_str!("templates/data.js")),
 ];
@@ -62,10 +64,7 @@ enum PartContext {
 /// # Errors
 /// [`Error::Output`]; [`Error::Usage`] for images that do not fit together.
 pub fn write(dir: &Path, page: &Page) -> Result<PathBuf> {
-    let mut environment = Environment::new();
-    for (name, source) in TEMPLATES {
-        environment.add_template(name, source).map_err(broken)?;
-    }
+    let environment = templates()?;
     let data = dir.join("data");
     fs::create_dir_all(&data).map_err(|e| Error::write(&data, &e))?;
     let mut colors = HashMap::new();
@@ -125,6 +124,18 @@ pub fn write(dir: &Path, page: &Page) -> Result<PathBuf> {
     Ok(index)
 }
 
+/// The templates, compiled.
+///
+/// # Errors
+/// [`Error::CheckFailed`] for one that is broken, which is a bug.
+pub(super) fn templates() -> Result<Environment<'static>> {
+    let mut environment = Environment::new();
+    for (name, source) in TEMPLATES {
+        environment.add_template(name, source).map_err(broken)?;
+    }
+    Ok(environment)
+}
+
 /// The address of a file, as a browser takes it: `file:///home/me/report/index.html`.
 pub fn address(path: &Path) -> String {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -150,12 +161,12 @@ fn remove_data_after(data: &Path, images: usize) {
     let _ = fs::remove_dir(data);
 }
 
-fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// Templates are part of the program: one that does not work is a bug, and tests render all of them.
-fn broken(error: minijinja::Error) -> Error {
+pub(super) fn broken(error: minijinja::Error) -> Error {
     Error::CheckFailed(format!("a template of the report is broken: {error:#}"))
 }
 

@@ -71,6 +71,21 @@ impl Table {
         self
     }
 
+    /// The table as lines of text: the first column to the left, the others to the right.
+    pub fn lines(&self) -> Vec<String> {
+        let titles: Vec<&str> = self.columns.iter().map(|c| c.title.as_str()).collect();
+        let rows: Vec<Vec<&str>> = self.rows.iter().map(|r| r.cells.iter().map(|c| c.text.as_str()).collect()).collect();
+        let all: Vec<&Vec<&str>> = std::iter::once(&titles).chain(&rows).collect();
+        let width = |c: usize| all.iter().filter_map(|row| row.get(c)).map(|text| text.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..titles.len()).map(width).collect();
+        let cell = |(c, text): (usize, &&str)| {
+            let w = widths.get(c).copied().unwrap_or(0);
+            if c == 0 { format!("{text:w$}") } else { format!("{text:>w$}") }
+        };
+        let line = |row: &&Vec<&str>| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned();
+        all.iter().map(line).collect()
+    }
+
     /// The table with this title.
     pub fn titled(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
@@ -143,9 +158,29 @@ pub fn format_number(value: f64) -> String {
     }
 }
 
+/// A number with separators between thousands.
+pub fn thousands(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (k, c) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(c);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let row = |a: &str, b: &str| Row::new([a.into(), b.into()]);
+        let table = Table::new(&["name", "n"]).row(row("a", "1000")).row(row("longer", "-"));
+        assert_eq!(table.lines(), ["name       n", "a       1000", "longer     -"]);
+    }
 
     #[test]
     fn numbers_have_four_digits() {
@@ -153,5 +188,10 @@ mod tests {
         assert_eq!([0.0, 1.0, 0.012344, -12.3456].map(of), ["0", "1.000", "0.01234", "-12.35"]);
         assert_eq!([123456.4, 1.2344e-7, 3e12, f64::INFINITY].map(of), ["123456", "1.234e-7", "3.000e12", "inf"]);
         assert_eq!([of(f64::NAN), of(0.099_999_99), of(-9999.96)], ["NaN", "0.1000", "-10000"]);
+    }
+
+    #[test]
+    fn thousands_are_apart() {
+        assert_eq!([0, 999, 1000, 25_000_000].map(thousands), ["0", "999", "1,000", "25,000,000"]);
     }
 }

@@ -4,12 +4,14 @@ mod gltf;
 mod icosphere;
 mod material;
 mod mesh_bin;
+mod peer;
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
 pub use gltf::{companions, export_gltf, is_companion_of};
 pub use mesh_bin::{mesh_bin, read_mesh_bin, write_mesh_bin};
+pub use peer::write_peer_scene;
 
 use crate::error::Result;
 

@@ -1,8 +1,10 @@
-//! `skylit bench ao` from outside: what it measures and writes of tiny scenes, and what it refuses.
+//! `skylit bench ao`, which is `bench frames` of ambient occlusion, from outside: what it measures and writes of tiny scenes, and what it refuses.
 use std::process::{Command, Output, Stdio};
 
 use crate::common::command::{device, fails, json, skylit, stderr};
 use serde_json::Value;
+
+use super::measured::{contestants, curve, find, of_part, scenes, value};
 
 const TINY: [&str; 8] = ["--quick", "--size", "48x27", "--frames", "8", "--reference-rays", "16", "--quiet"];
 
@@ -29,7 +31,7 @@ fn wrong_usage() {
     fails(&run(&["--frames", "1"]), 64, &["--frames"]);
     fails(&run(&["--reference-rays", "1"]), 64, &["--reference-rays"]);
     fails(&run(&["--size", "big"]), 64, &["--size"]);
-    fails(&run(&["--plot", "a.pdf"]), 64, &[".png", ".svg"]);
+    fails(&run(&["--plot", "a.pdf"]), 64, &["must end in .svg"]);
     fails(&run(&["--baseline", "/nonexistent.json"]), 3, &["/nonexistent.json", "no such file"]);
     fails(&run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
     fails(&run(&["builtin:nothing"]), 64, &["nothing"]);
@@ -44,59 +46,56 @@ fn gpu_views_of_a_scene() {
     }
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    let (csv, plot, json) = (at("a.csv"), at("a.png"), at("a.json"));
+    let (csv, plot, json) = (at("a.csv"), at("a.svg"), at("a.json"));
     let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap(), "--json", json.to_str().unwrap()];
     let out = run(&[&["builtin:stairs", "--presets", "larsen,balanced,gtao"], &TINY[..7], &files].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
-    for word in ["builtin:stairs, near", "builtin:stairs, far", "balanced over larsen", "unfiltered"] {
+    for word in ["builtin:stairs, near", "builtin:stairs, far", "balanced over larsen", "unfiltered RMSE"] {
         assert!(text.contains(word), "{word}: {text}");
     }
     let record: Value = serde_json::from_slice(&std::fs::read(at("a.json")).unwrap()).unwrap();
-    let views = record["views"].as_array().unwrap();
-    assert_eq!(views.iter().map(|v| v["view"].as_str().unwrap()).collect::<Vec<_>>(), ["near", "far"]);
+    let views = ["builtin:stairs, near", "builtin:stairs, far"];
+    assert_eq!(scenes(&record), views);
     // where one ray a pixel takes longer than larsen's frame, there is none
-    let has_equal_time = views.iter().any(|v| v["verdict"]["equal_time"].is_object());
+    let has_equal_time = !of_part(&record, "", "equal time").is_empty();
     assert_eq!(text.contains("  equal time: balanced with"), has_equal_time, "{text}");
     for view in views {
-        assert!(view["covered"].as_u64().unwrap() > 50 && view["reference_rmse"].as_f64().unwrap() > 0.0);
-        let names: Vec<_> = view["results"].as_array().unwrap().iter().map(|r| r["preset"].as_str().unwrap()).collect();
-        assert_eq!(names, ["larsen", "balanced", "gtao"]);
-        let [larsen, balanced, gtao] = [0, 1, 2].map(|k| &view["results"][k]);
-        let covered = view["covered"].as_f64().unwrap();
+        assert_eq!(contestants(&record, view, "still"), ["larsen", "balanced", "gtao", "reference"]);
+        let of = |preset: &str, quantity: &str| value(&record, [view, "still", preset, quantity]);
+        let covered = of("reference", "pixels");
+        assert!(covered > 50.0 && of("reference", "RMSE") > 0.0);
         // each pixel that shows something gets its ray, and none where nothing is
-        assert_eq!(balanced["still"]["cost"]["rays"].as_f64(), Some(covered));
-        assert!(larsen["still"]["cost"]["rays"].as_f64().unwrap() > 8.0 * covered);
-        assert_eq!(gtao["still"]["cost"]["rays"].as_f64(), Some(0.0));
-        assert_eq!(larsen["still"]["cost"]["camera_rays"].as_f64(), Some(48.0 * 27.0));
-        assert_eq!(balanced["still"]["cost"]["camera_rays"].as_f64(), Some(0.0));
-        let curve = balanced["still"]["curve"].as_array().unwrap();
-        assert_eq!(curve.iter().map(|p| p["frame"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2, 4, 8]);
-        let rmse = |k: usize| curve[k]["errors"]["rmse"].as_f64().unwrap();
-        assert!(rmse(3) < rmse(0) && rmse(3) > 0.0, "{curve:?}");
-        for number in ["bias", "flip", "tanimoto", "minimum_ratio", "rmse_corrected"] {
-            assert!(curve[3]["errors"][number].is_f64(), "{number}");
+        assert_eq!(of("balanced", "rays"), covered);
+        assert!(of("larsen", "rays") > 8.0 * covered);
+        assert_eq!(of("gtao", "rays"), 0.0);
+        assert_eq!((of("larsen", "camera rays"), of("balanced", "camera rays")), (48.0 * 27.0, 0.0));
+        let errors = curve(&record, [view, "still", "balanced", "RMSE"]);
+        assert_eq!(errors.iter().map(|p| p.0).collect::<Vec<_>>(), [1.0, 2.0, 4.0, 8.0]);
+        assert!(errors[3].1 < errors[0].1 && errors[3].1 > 0.0, "{errors:?}");
+        for quantity in ["bias", "FLIP", "Tanimoto", "minimum ratio", "corrected RMSE"] {
+            assert!(of("balanced", quantity).is_finite(), "{quantity}");
         }
-        assert!(curve[3]["unfiltered"]["rmse"].as_f64().unwrap() > 0.0);
-        assert_eq!(balanced["rest"]["cost"]["rays"].as_f64(), Some(0.0));
-        assert!(larsen["rest"].is_null());
-        assert_eq!(balanced["moving"]["frames"].as_array().unwrap().len(), 4);
-        let passes = balanced["still"]["moving_cost"]["passes"].as_array().unwrap();
-        assert!(passes.iter().any(|p| p["pass"] == "gbuffer"), "{passes:?}");
-        let ratio = view["verdict"]["rays_ratio"].as_f64().unwrap();
+        for preset in ["larsen", "balanced"] {
+            assert!(of(preset, "unfiltered RMSE") > 0.0, "{preset}");
+        }
+        assert_eq!(value(&record, [view, "rest", "balanced", "rays"]), 0.0);
+        assert_eq!(contestants(&record, view, "rest"), ["balanced"]);
+        assert!(value(&record, [view, "orbit", "balanced", "unfiltered RMSE"]) > 0.0);
+        assert!(find(&record, [view, "still, camera rays, passes", "balanced", "gbuffer"]).is_some());
+        let ratio = of("balanced", "rays") / of("larsen", "rays");
         assert!((0.04..0.1).contains(&ratio), "{ratio}");
     }
     let mut rows = csv::Reader::from_path(&csv).unwrap();
-    let head = rows.headers().unwrap().clone();
-    let part = head.iter().position(|h| h == "part").unwrap();
-    let pass = head.iter().position(|h| h == "pass").unwrap();
-    let rows: Vec<_> = rows.records().map(Result::unwrap).collect();
-    let count = |name: &str| rows.iter().filter(|r| &r[part] == name && r[pass].is_empty()).count();
-    // two views; three presets with four frames each; two of these three never rest
-    assert_eq!([count("still"), count("still, camera rays"), count("moving"), count("rest")], [24, 6, 6, 2]);
-    let image = skylit::output::load(&plot).unwrap();
-    assert!(image.width > 500 && image.height > 300);
-    assert_eq!(record["benchmark"], "ao");
+    assert_eq!(rows.records().map(Result::unwrap).count(), record["measurements"].as_array().unwrap().len());
+    let drawn = std::fs::read_to_string(&plot).unwrap();
+    for part in
+        ["builtin:stairs, near, still: time against error", "Pareto front", "error over time", "reference&#x27;s own error"]
+    {
+        assert!(drawn.contains(part), "{part}");
+    }
+    let of_what = (record["benchmark"].as_str(), record["settings"]["integrator"].as_str());
+    assert_eq!(of_what, (Some("frames"), Some("ao")));
     let left: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.len() == 3, "{left:?}");
 }
@@ -115,14 +114,14 @@ fn gpu_a_baseline() {
     let out = run(&compared);
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
     let baseline = &record["baseline"];
-    // two views: three times and two errors each
+    // two views: three times, two errors and flicker each
     assert_eq!(
         (baseline["compared"].as_u64(), baseline["missing"].as_array().map(Vec::len)),
-        (Some(10), Some(0)),
+        (Some(12), Some(0)),
         "{baseline}"
     );
     let regressions = baseline["regressions"].as_array().unwrap();
-    assert!(regressions.iter().all(|r| r["quantity"].as_str().unwrap().starts_with("ms")), "{regressions:?}");
+    assert!(regressions.iter().all(|r| r["quantity"].as_str().unwrap().ends_with(", ms")), "{regressions:?}");
     assert_eq!(out.status.code(), Some(i32::from(!regressions.is_empty())), "{}", stderr(&out));
     // with other settings nothing is measured
     fails(&run(&[&compared[..], &["--ao-falloff", "binary"]].concat()), 64, &["its falloff is exponential, not binary"]);
@@ -141,28 +140,30 @@ fn gpu_changes() {
         "--frames",
         "16",
         "--parts",
-        "changes",
+        "change,animation",
+        "--views",
+        "near",
         "--presets",
         "larsen,fast",
+        "room",
+        "builtin:parade",
         "--json",
         "--quiet",
     ]);
     assert!(out.status.success(), "{}", stderr(&out));
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
-    let changes = record["changes"].as_array().unwrap();
-    let names: Vec<_> = changes.iter().map(|c| c["change"].as_str().unwrap()).collect();
-    assert_eq!(names, ["appear", "slide", "sidestep", "animated"]);
-    let [larsen, fast] = [0, 1].map(|k| &changes[0]["results"][k]);
-    let half_life = larsen["memory_half_life"].as_f64().unwrap();
+    assert_eq!(scenes(&record), ["room", "builtin:parade"]);
+    let of = |part: &str, preset: &str, quantity: &str| value(&record, ["room", part, preset, quantity]);
+    let half_life = of("appear", "larsen", "half-life of memory");
     assert!((half_life - 1.0).abs() < 0.1, "{half_life}");
-    let left = |r: &Value| r["memory"][0].as_f64().unwrap();
-    assert!(left(fast).abs() < 0.3 && left(fast) < left(larsen), "{} {}", left(fast), left(larsen));
-    for r in [larsen, fast] {
-        assert!(r["stale_pixels"].is_u64() && r["ghosting"].as_f64().unwrap() >= 0.0, "{r}");
+    let [larsen, fast] = ["larsen", "fast"].map(|preset| of("appear", preset, "memory"));
+    assert!(fast.abs() < 0.3 && fast < larsen, "{fast} {larsen}");
+    for preset in ["larsen", "fast"] {
+        assert!(of("appear", preset, "stale pixels") >= 0.0 && of("appear", preset, "ghosting") >= 0.0, "{preset}");
     }
-    assert!(changes[1]["results"][1]["update_ms"]["median"].as_f64().unwrap() > 0.0);
-    assert!(changes[2]["pixels"].as_u64().unwrap() > 10 && changes[2]["results"][0]["recovery"].is_u64());
-    assert!(changes[3]["results"][1]["errors"]["rmse"].as_f64().unwrap() < 0.2);
+    assert!(of("slide", "fast", "update") > 0.0 && of("slide", "fast", "ghosting") >= 0.0);
+    assert!(of("sidestep", "reference", "pixels") > 10.0 && of("sidestep", "larsen", "recovered").is_finite());
+    assert!(value(&record, ["builtin:parade", "animation", "fast", "RMSE"]) < 0.2);
 }
 
 #[test]
@@ -171,27 +172,31 @@ fn gpu_structures_and_series() {
         return;
     }
     let structures = record(&["--parts", "structures"]);
-    let first = &structures["structures"][0];
-    assert_eq!((first["meshes"].as_u64(), first["instances"].as_u64()), (Some(15), Some(125)));
-    for number in ["top", "refit"] {
-        assert!(first[number]["median"].as_f64().unwrap() > 0.0, "{number}: {first}");
+    assert!(structures["scenes"][0]["about"].as_str().unwrap().contains("in 125 instances"), "{}", structures["scenes"]);
+    let names = contestants(&structures, "builtin:instances:25000", "structures");
+    assert!(names[0] == "first build" && names[1].starts_with("top level, ") && names[2] == "mesh, refitted", "{names:?}");
+    for name in &names[1..3] {
+        assert!(value(&structures, ["builtin:instances:25000", "structures", name, "update"]) > 0.0, "{name}");
     }
     let args = ["builtin:stairs", "--frames", "4", "--series", "triangles,rays,resolution,sampling"];
     let out = run(&[&["--quick", "--size", "48x27", "--reference-rays", "8", "--json", "--quiet"], &args[..]].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let all: Value = serde_json::from_slice(&out.stdout).unwrap();
-    let series = all["series"].as_array().unwrap();
-    let names: Vec<_> = series.iter().map(|s| s["series"].as_str().unwrap()).collect();
-    assert_eq!(names, ["triangles", "rays", "resolution", "sampling"]);
-    assert_eq!(series[0]["lines"].as_array().unwrap().len(), 2);
-    assert_eq!(series[3]["lines"].as_array().unwrap().len(), 5);
-    let last = |line: &Value| line["points"].as_array().unwrap().last().unwrap().clone();
-    let last: Vec<_> = series[3]["lines"].as_array().unwrap().iter().map(last).collect();
-    assert!(last.iter().all(|p| p["unfiltered_rmse"].as_f64().unwrap() > 0.0));
+    let scene = "builtin:stairs, near";
+    assert_eq!(contestants(&all, scene, "by triangles"), ["balanced", "larsen"]);
+    assert!(value(&all, [scene, "by triangles", "larsen", "time"]) > 0.0);
+    assert_eq!(curve(&all, [scene, "by rays", "balanced", "time"]).len(), 2);
+    assert_eq!(curve(&all, [scene, "by resolution", "fast", "time"]).len(), 2);
+    let sequences = contestants(&all, scene, "by sequence");
+    assert_eq!(sequences.len(), 5);
+    for sequence in &sequences {
+        let unfiltered = curve(&all, [scene, "by sequence", sequence, "unfiltered RMSE"]);
+        assert!(unfiltered.last().unwrap().1 > 0.0, "{sequence}");
+    }
     // the fastest has all its frames when it is done; of another the first may take longer than that, on a machine that stumbles
-    let at_equal_time: Vec<_> = last.iter().filter_map(|p| p["equal_time_rmse"].as_f64()).collect();
-    assert!(!at_equal_time.is_empty() && at_equal_time.iter().all(|&rmse| rmse > 0.0));
-    assert!(all["views"].as_array().unwrap().is_empty());
+    let done: Vec<_> = of_part(&all, scene, "by sequence").into_iter().filter(|m| m["quantity"] == "equal-time RMSE").collect();
+    assert!(!done.is_empty() && done.iter().all(|m| m["values"].as_f64().unwrap() > 0.0));
+    assert!(of_part(&all, "", "still").is_empty());
 }
 
 /// What was measured until the time was over is there, and said to be not all.
@@ -202,8 +207,8 @@ fn gpu_time_limit() {
     }
     let record = record(&["builtin:plane", "builtin:stairs", "--time-limit", "0.000001"]);
     assert_eq!(record["stopped_early"], true);
-    assert_eq!(record["views"].as_array().unwrap().len(), 1);
-    assert_eq!(record["views"][0]["results"].as_array().unwrap().len(), 1);
+    assert_eq!(scenes(&record), ["builtin:plane, near"]);
+    assert_eq!(contestants(&record, "builtin:plane, near", "still"), ["larsen", "reference"]);
     assert!(record["notes"].to_string().contains("builtin:stairs: left out"), "{}", record["notes"]);
 }
 
@@ -225,7 +230,7 @@ fn gpu_interruption() {
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(record["exit_code"], 130);
     let written = csv.exists();
-    assert_eq!(written, !record["views"].as_array().unwrap().is_empty());
+    assert_eq!(written, !record["measurements"].as_array().unwrap().is_empty());
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), usize::from(written));
 }
 
@@ -238,9 +243,10 @@ fn gpu_a_scene_that_fails_leaves_the_rest() {
     let dir = tempfile::tempdir().unwrap();
     let broken = dir.path().join("broken.glb");
     std::fs::write(&broken, "no glTF").unwrap();
-    let scenes = [broken.to_str().unwrap(), "builtin:plane", "--presets", "fast", "--parts", "still", "--json"];
-    let out = run(&[&scenes[..], &TINY[..7]].concat());
+    let args = [broken.to_str().unwrap(), "builtin:plane", "--presets", "fast", "--parts", "still", "--json"];
+    let out = run(&[&args[..], &TINY[..7]].concat());
     fails(&out, 3, &["broken.glb"]);
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!((record["views"].as_array().unwrap().len(), record["exit_code"].as_u64()), (2, Some(3)));
+    assert_eq!(scenes(&record), ["builtin:plane, near", "builtin:plane, far"]);
+    assert_eq!(record["exit_code"], 3);
 }

@@ -6,6 +6,8 @@ use std::process::Output;
 use crate::common::command::{device, fails, json, run};
 use serde_json::Value;
 
+use super::measured::{contestants, curve, find, scenes, value};
+
 /// A peer that takes half a second, always, and whose images are black but for the first pixel. It keeps the scene that it gets.
 const FAKE: &str = r#"
 kept=$1; dies_at=$2; pixels=$3
@@ -68,7 +70,7 @@ fn wrong_usage() {
     fails(&command(&["--strategies", "magic"]), 64, &["magic", "uniform"]);
     fails(&command(&["--seconds", "-1"]), 64, &["--seconds"]);
     fails(&command(&["--repeats", "0"]), 64, &["--repeats"]);
-    fails(&command(&["--plot", "a.pdf"]), 64, &[".png"]);
+    fails(&command(&["--plot", "a.pdf"]), 64, &["must end in .svg"]);
     fails(&command(&["--json=/nonexistent/a.json"]), 4, &["folder does not exist"]);
     fails(&command(&["sphere-nothing"]), 3, &["sphere-nothing"]);
     fails(&command(&["--peers", "/nonexistent.toml"]), 3, &["/nonexistent.toml"]);
@@ -81,44 +83,42 @@ fn gpu_error_against_time() {
         return;
     }
     let place = Place::new("", 96);
-    let (csv, plot) = (place.at("a.csv"), place.at("a.png"));
+    let (csv, plot) = (place.at("a.csv"), place.at("a.svg"));
     let files = ["cornell", "--strategies", "mis,uniform", "--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
     let (record, notes) = place.record(&files);
     assert!(!notes.contains("rays"), "a peer that traces rays was asked: {notes}");
     assert_eq!(record["peers"], serde_json::json!(["Fake"]));
-    let scene = &record["scenes"][0];
-    let engines: Vec<_> = scene["references"].as_array().unwrap().iter().map(|r| r["engine"].as_str().unwrap()).collect();
-    assert_eq!(engines, ["skylit", "fake"]);
-    assert!(scene["references"][0]["rmse"].as_f64().unwrap() > 0.0);
-    assert_eq!(scene["references"][1]["rmse"], 0.0, "its images are all the same");
-    assert!(scene["differences"][0]["mean_ratio"].as_f64().unwrap() < 0.5);
-    let results = scene["results"].as_array().unwrap();
-    let names: Vec<_> = results.iter().map(|r| r["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["mis", "uniform", "fake k", "fake l"]);
-    for ours in &results[..2] {
-        let points = ours["points"].as_array().unwrap();
-        assert!(points.len() >= 2 && points[1]["spp"] == 4, "{points:?}");
-        assert_eq!(points[0]["seconds"]["median"].as_f64().map(|s| s > 0.0), Some(true));
-        let rmse = |k: usize| points[k]["rmse"].as_f64().unwrap();
-        assert!(rmse(points.len() - 1) < rmse(0), "{points:?}");
-        assert!(ours["mrays"].as_f64().unwrap() > ours["mpaths"].as_f64().unwrap());
+    assert_eq!(scenes(&record), ["cornell"]);
+    let images = |contestant: &str, quantity: &str| value(&record, ["cornell", "images", contestant, quantity]);
+    let names = ["reference of skylit", "reference of fake", "mis", "uniform", "fake k", "fake l"];
+    assert_eq!(contestants(&record, "cornell", "images"), names);
+    assert!(images("reference of skylit", "RMSE") > 0.0);
+    assert_eq!(images("reference of fake", "RMSE"), 0.0, "its images are all the same");
+    assert!(images("reference of fake", "mean over ours") < 0.5);
+    for ours in ["mis", "uniform"] {
+        let times = curve(&record, ["cornell", "images", ours, "time"]);
+        assert!(times.len() >= 2 && times[1].0 == 4.0 && times[0].1 > 0.0, "{times:?}");
+        let rmse = curve(&record, ["cornell", "images", ours, "mean RMSE"]);
+        assert!(rmse[rmse.len() - 1].1 < rmse[0].1, "{rmse:?}");
+        assert!(images(ours, "rays") > images(ours, "paths"));
     }
     // half a second an image is more than it may take: it stops as soon as it may
-    assert_eq!(results[2]["points"].as_array().unwrap().len(), 2);
-    assert_eq!(results[2]["points"][0]["seconds"]["median"], 0.5);
+    assert_eq!(curve(&record, ["cornell", "images", "fake k", "time"]), [(1.0, 0.5), (4.0, 0.5)]);
+    // its images are exact: an error of nothing is no target
+    assert!(find(&record, ["cornell", "images", "mis", "times as long"]).is_none());
     // it is told all that is there
     let told: Value = serde_json::from_slice(&std::fs::read(place.at("kept/scene.json")).unwrap()).unwrap();
     assert_eq!(told["size"], serde_json::json!([12, 8]));
     let size = |name: &Value| std::fs::metadata(place.at("kept").join(name.as_str().unwrap())).unwrap().len();
     let triangles: u64 = told["meshes"].as_array().unwrap().iter().map(|m| size(&m["indices"]) / 12).sum();
-    assert_eq!(Some(triangles), scene["triangles"].as_u64());
+    let about = record["scenes"][0]["about"].as_str().unwrap();
+    assert!(about.starts_with(&format!("{triangles} triangles")), "{about}");
     let lamps = told["materials"].as_array().unwrap().iter().filter(|m| m["emissive"][0].as_f64() > Some(0.0)).count();
     assert_eq!(lamps, 1);
     let rows = csv::Reader::from_path(&csv).unwrap().records().count();
-    let points: usize = results.iter().map(|r| r["points"].as_array().unwrap().len()).sum();
-    assert_eq!(rows, points);
-    let image = skylit::output::load(&plot).unwrap();
-    assert!(image.width > 500 && image.height > 300);
+    assert_eq!(rows, record["measurements"].as_array().unwrap().len());
+    let drawn = std::fs::read_to_string(&plot).unwrap();
+    assert!(drawn.starts_with("<svg") && drawn.contains("cornell, images: error over time"), "{drawn}");
 }
 
 /// What a peer cannot do leaves it out, with its reason; without peers, errors are held against our own.
@@ -132,9 +132,8 @@ fn gpu_peers_that_fail_are_left_out() {
     {
         let (record, notes) = place.record(&["sphere-diffuse", "--strategies", "mis"]);
         assert!(notes.contains("peer 'fake' left out") && notes.contains(says), "{notes}");
-        let scene = &record["scenes"][0];
-        assert_eq!(scene["results"].as_array().unwrap().len(), 1);
-        assert_eq!(scene["target"]["set_by"], "mis");
-        assert!(scene["environment"].as_str().unwrap().starts_with("own sun map"));
+        assert_eq!(contestants(&record, "sphere-diffuse", "images"), ["reference", "mis"]);
+        assert_eq!(value(&record, ["sphere-diffuse", "images", "mis", "times as long"]), 1.0);
+        assert!(record["scenes"][0]["about"].as_str().unwrap().contains("environment own sun map"));
     }
 }

@@ -6,6 +6,8 @@ use std::process::{Command, Output, Stdio};
 use crate::common::command::{device, fails, json, skylit, stderr};
 use serde_json::Value;
 
+use super::measured::{contestants, find, of_part, scenes, value};
+
 /// A peer that takes no time and writes down what it is asked. Its clock says a quarter of a second, always. Its hits are
 /// zeros: it claims to meet the first primitive at t = 0.
 const FAKE: &str = r#"
@@ -75,7 +77,7 @@ fn wrong_usage() {
     fails(&place.run(&["--kernels", "magic"]), 64, &["magic", "wide, packet, nearest"]);
     fails(&place.run(&["--streams", "up"]), 64, &["up", "primary"]);
     fails(&place.run(&["--repeats", "0"]), 64, &["--repeats"]);
-    fails(&place.run(&["--plot", "a.pdf"]), 64, &[".png"]);
+    fails(&place.run(&["--plot", "a.png"]), 64, &["must end in .svg"]);
     fails(&place.run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
     fails(&place.run(&["builtin:nothing"]), 64, &["nothing"]);
     fails(&place.run(&["no-such-scene.glb"]), 3, &["no such file"]);
@@ -114,28 +116,22 @@ fn gpu_rounds_are_interleaved() {
         }
     }
 
-    let scene = &record["scenes"][0];
-    let primary = &scene["streams"][0];
-    assert_eq!(primary["stream"], "primary");
-    let results = primary["results"].as_array().unwrap();
-    let names: Vec<_> = results.iter().map(|r| r["contestant"].as_str().unwrap()).collect();
-    assert_eq!(names, ["wide", "a k", "b k"]);
-    let rays = primary["rays"].as_f64().unwrap();
-    for r in &results[1..] {
-        let rate = r["device"]["median"].as_f64().unwrap();
+    let scene = "builtin:cornell-box";
+    assert_eq!(contestants(&record, scene, "primary"), ["wide", "a k", "b k"]);
+    let of = |contestant: &str, quantity: &str| value(&record, [scene, "primary", contestant, quantity]);
+    for peer in ["a k", "b k"] {
+        let (rate, rays) = (of(peer, "rate"), of(peer, "traced"));
         assert!((rate - rays / 0.25 / 1e6).abs() < 1e-9 * rate);
-        assert_eq!(r["seconds"].as_array().unwrap().len(), 3);
-        assert!((r["hit_share"].as_f64().unwrap() - 3.0 / rays).abs() < 1e-12);
-        assert_eq!((r["ratios"][0]["to"].as_str(), r["ratios"][0]["ratio"].as_f64()), (Some("b k"), Some(1.0)));
-        assert!(r["wall"].is_null());
+        let repeated = find(&record, [scene, "primary", peer, "rate"]).unwrap();
+        assert_eq!((repeated["values"]["count"].as_u64(), &repeated["is_peers"]), (Some(3), &Value::Bool(true)));
+        assert!((of(peer, "hit share") - 3.0 / rays).abs() < 1e-12);
+        assert_eq!(of(peer, "x b k"), 1.0);
+        assert!(find(&record, [scene, "primary", peer, "wall rate"]).is_none());
     }
-    // ours: the ratio is what the seconds say
-    let mut ours: Vec<f64> = results[0]["seconds"].as_array().unwrap().iter().map(|s| 0.25 / s.as_f64().unwrap()).collect();
-    ours.sort_by(f64::total_cmp);
-    assert!((results[0]["ratios"][0]["ratio"].as_f64().unwrap() / ours[1] - 1.0).abs() < 1e-9);
-    assert!(results[0]["hit_share"].as_f64().unwrap() > 0.5);
-    let build = &scene["builds"][1];
-    assert_eq!((build["contestant"].as_str(), build["build_seconds"].as_f64()), (Some("a k"), Some(0.5)));
+    // ours: the ratio is what the rates say
+    assert!((of("wide", "x b k") / (of("wide", "rate") / of("b k", "rate")) - 1.0).abs() < 1e-9);
+    assert!(of("wide", "hit share") > 0.5 && of("wide", "wall rate") > 0.0);
+    assert_eq!(value(&record, [scene, "building", "a k", "build"]), 0.5);
 }
 
 #[test]
@@ -144,26 +140,30 @@ fn gpu_files_of_results() {
         return;
     }
     let place = Place::new(&Place::entry("a", "", "baselines = ['k']"));
-    let (csv, plot, record) = (place.at("a.csv"), place.at("a.png"), place.at("a.json"));
+    let (csv, plot, record) = (place.at("a.csv"), place.at("a.svg"), place.at("a.json"));
     let args = ["builtin:terrain:200", "builtin:terrain:2000", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "2"];
     let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
     let out = place.run(&[&args[..], &files, &[&format!("--json={}", record.display())]].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
-    for word in ["builtin:terrain:2000: 2,000 triangles", "shuffled-any", "x a k", "no faster than log n", "bytes/primitive"] {
+    for word in
+        ["builtin:terrain:2000:\n  2,000 triangles", "shuffled-any", "x a k", "no faster than log n: ", "bytes a primitive"]
+    {
         assert!(text.contains(word), "{word}: {text}");
     }
     let mut rows = csv::Reader::from_path(&csv).unwrap();
     let head = rows.headers().unwrap().clone();
-    for column in ["scene", "stream", "contestant", "Mrays/s", "ratio to a k"] {
+    for column in ["scene", "part", "contestant", "quantity", "median"] {
         assert!(head.iter().any(|h| h == column), "{column}");
     }
     // two scenes, five streams, three contestants
-    assert_eq!(rows.records().map(Result::unwrap).count(), 2 * 5 * 3);
-    let image = skylit::output::load(&plot).unwrap();
-    assert!(image.width > 500 && image.height > 500);
+    let quantity = head.iter().position(|h| h == "quantity").unwrap();
+    assert_eq!(rows.records().map(Result::unwrap).filter(|r| &r[quantity] == "rate").count(), 2 * 5 * 3);
+    let drawn = std::fs::read_to_string(&plot).unwrap();
+    assert!(drawn.starts_with("<svg") && drawn.contains("shuffled-any") && drawn.contains("as 1 &#x2f; log n"), "{drawn}");
     let record: Value = serde_json::from_slice(&std::fs::read(&record).unwrap()).unwrap();
-    assert_eq!(record["scaling"].as_array().unwrap().len(), 5 * 3);
+    let laws = record["measurements"].as_array().unwrap().iter().filter(|m| m["quantity"] == "worst x log n");
+    assert_eq!(laws.count(), 5 * 3);
     let left: Vec<_> = std::fs::read_dir(place.dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
 
@@ -199,8 +199,7 @@ fn gpu_missing_peers_are_named_and_left_out() {
         assert!(notes.iter().any(|n| n.contains(who) && n.contains(why)), "{who} {why}: {notes:?}");
     }
     // the rest is measured
-    let results = record["scenes"][0]["streams"][0]["results"].as_array().unwrap();
-    assert_eq!(results.len(), 1);
+    assert_eq!(contestants(&record, "builtin:cornell-box", "primary"), ["wide"]);
     // and people are told, too
     assert!(stderr(&place.run(&SMALL)).contains("skylit: warning: peer 'x' is missing"));
 }
@@ -214,10 +213,10 @@ fn gpu_refusals_leave_the_rest() {
     let place = Place::new("");
     let args = ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
     let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
-    assert_eq!(record["build"], "fast");
+    assert_eq!(record["settings"]["build"], "fast");
     let notes = record["notes"].to_string();
     assert!(notes.contains("'brute' left out: traversal 'brute' tests every primitive"), "{notes}");
-    assert_eq!(record["scenes"][0]["streams"][0]["results"].as_array().unwrap().len(), 1);
+    assert_eq!(contestants(&record, "builtin:grid:8", "primary"), ["wide"]);
     fails(&place.run(&[&args[..], &["brute"]].concat()), 3, &["traversal 'brute' tests every primitive"]);
 }
 
@@ -230,20 +229,17 @@ fn gpu_wrong_answers_fail_the_check() {
     let lenient = Place::new(&Place::entry("a", "", ""));
     let args = ["builtin:cornell-box", "--rays", "2000", "--repeats", "1", "--kernels", "wide,nearest", "--check"];
     let record = json(&lenient.run(&[&args[..], &["--json"]].concat()));
-    let checks = record["scenes"][0]["checks"].as_array().unwrap();
-    let of = |who: &str, stream: &str| {
-        checks.iter().find(|c| c["contestant"] == who && c["stream"] == stream).unwrap_or_else(|| panic!("{who} {stream}"))
+    let of = |who: &str, stream: &str, quantity: &str| {
+        value(&record, ["builtin:cornell-box", &format!("answers, {stream}"), who, quantity])
     };
     for stream in ["primary", "ao-any", "ao-closest", "shuffled-any", "shadow-any"] {
-        let ours = of("nearest", stream);
-        assert_eq!(ours["unexplained"], 0, "{ours}");
-        assert_eq!(ours["agree"].as_u64().unwrap() + ours["ties"].as_u64().unwrap(), ours["rays"].as_u64().unwrap());
+        let ours = |quantity: &str| of("nearest", stream, quantity);
+        assert_eq!(ours("unexplained"), 0.0, "{stream}");
+        assert_eq!(ours("agree") + ours("ties"), ours("compared"));
         // the box has the light outside: that nothing sees it is right by chance
-        assert!(stream == "shadow-any" || of("a k", stream)["unexplained"].as_u64().unwrap() > 0, "{stream}");
+        assert!(stream == "shadow-any" || of("a k", stream, "unexplained") > 0.0, "{stream}");
     }
-    let all = of("a k", "primary");
-    assert_eq!(all["unexplained"], all["rays"]);
-    assert!(!all["examples"].as_array().unwrap().is_empty());
+    assert_eq!(of("a k", "primary", "unexplained"), of("a k", "primary", "compared"));
 
     let strict = Place::new(&Place::entry("a", "", "strict = ['k']"));
     fails(&strict.run(&args), 1, &["'a k' differ from those of 'wide'", "primary", "builtin:cornell-box"]);
@@ -260,8 +256,9 @@ fn gpu_time_limit_and_interruption() {
         ["builtin:plane", "builtin:stairs", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "1000", "--check"];
     let record = json(&place.run(&[&args[..], &["--time-limit", "0.000001", "--json"]].concat()));
     assert_eq!(record["stopped_early"], true);
-    assert_eq!((record["scenes"].as_array().unwrap().len(), record["scenes"][0]["streams"].as_array().unwrap().len()), (1, 1));
-    assert_eq!(record["scenes"][0]["streams"][0]["results"][0]["seconds"].as_array().unwrap().len(), 1);
+    assert_eq!(scenes(&record), ["builtin:plane"]);
+    let rates: Vec<_> = record["measurements"].as_array().unwrap().iter().filter(|m| m["quantity"] == "rate").collect();
+    assert!(rates.iter().all(|m| m["part"] == "primary" && m["values"]["count"] == 1), "{rates:?}");
     let notes = record["notes"].to_string();
     for note in ["4 streams left out", "1 streams not checked", "builtin:stairs: left out"] {
         assert!(notes.contains(note), "{note}: {notes}");
@@ -307,11 +304,11 @@ fn gpu_a_scene_that_fails_leaves_the_rest() {
     let out = place.run(&[&args[..], &more].concat());
     fails(&out, 3, &["broken.glb"]);
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
-    let scenes: Vec<_> = record["scenes"].as_array().unwrap().iter().map(|s| s["scene"].as_str().unwrap()).collect();
-    assert_eq!(scenes, ["builtin:cornell-box", "builtin:plane"]);
+    assert_eq!(scenes(&record), ["builtin:cornell-box", "builtin:plane"]);
     assert!(record["notes"].to_string().contains("broken.glb: left out"), "{}", record["notes"]);
     assert_eq!(record["exit_code"], 3);
-    assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), 3);
+    let rows = std::fs::read_to_string(&csv).unwrap();
+    assert_eq!(rows.lines().filter(|l| l.contains(",rate,")).count(), 2, "{rows}");
 }
 
 /// Packets are for coherent rays: asked of others alone, there is nothing to measure, and that is said.
@@ -330,7 +327,7 @@ fn gpu_a_stream_without_contestants_is_named() {
     }
     fails(&out, 64, &["nothing was measured", "ao-any: no contestant takes part"]);
     let record = json(&place.run(&[&args[..], &["ao-any,primary", "--check", "--json"]].concat()));
-    assert_eq!(record["scenes"][0]["streams"].as_array().unwrap().len(), 1);
+    assert!(of_part(&record, "", "ao-any").is_empty() && !of_part(&record, "", "primary").is_empty());
     assert!(record["notes"].to_string().contains("hits not checked: only 'packet' traces these rays"), "{}", record["notes"]);
 }
 
@@ -366,13 +363,17 @@ fn gpu_embree_agrees() {
         println!("skipped: {notes}");
         return;
     }
-    for scene in record["scenes"].as_array().unwrap() {
-        let checks = scene["checks"].as_array().unwrap();
-        let robust: Vec<_> = checks.iter().filter(|c| c["contestant"].as_str().unwrap().contains("robust")).collect();
-        assert_eq!(robust.len(), 10, "{}", scene["scene"]);
-        for c in robust {
-            assert_eq!(c["unexplained"], 0, "{}: {c}", scene["scene"]);
-            assert!(c["agree"].as_u64().unwrap() * 100 >= c["rays"].as_u64().unwrap() * 99, "{c}");
-        }
+    for scene in scenes {
+        let all = record["measurements"].as_array().unwrap().iter();
+        let robust: Vec<_> = all
+            .filter(|m| m["scene"] == scene && m["part"].as_str().unwrap().starts_with("answers, "))
+            .filter(|m| m["contestant"].as_str().unwrap().contains("robust"))
+            .collect();
+        let counts = |quantity: &str| -> Vec<u64> {
+            let own = robust.iter().filter(|m| m["quantity"] == quantity);
+            own.map(|m| m["values"].as_f64().unwrap() as u64).collect()
+        };
+        assert_eq!(counts("unexplained"), [0; 10], "{scene}");
+        assert!(counts("agree").iter().zip(counts("compared")).all(|(agree, all)| agree * 100 >= all * 99), "{scene}");
     }
 }

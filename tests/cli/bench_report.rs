@@ -6,81 +6,68 @@ use crate::common::command::{assert_refusal, fails, json, place, run, stderr};
 use serde_json::{Value, json};
 
 /// Median and percentiles of repeats that spread by a few per cent.
-fn times(ms: f64) -> Value {
-    json!({ "median": ms, "p5": 0.96 * ms, "p25": 0.98 * ms, "p75": 1.02 * ms, "p95": 1.08 * ms, "count": 32 })
+fn times(median: f64) -> Value {
+    json!({ "median": median, "p5": 0.96 * median, "p25": 0.98 * median, "p75": 1.02 * median, "p95": 1.08 * median, "count": 32 })
 }
 
-fn errors(rmse: f64) -> Value {
-    json!({ "rmse": rmse, "rmse_corrected": 0.9 * rmse, "bias": 0.0, "flip": 0.01, "tanimoto": 0.9, "minimum_ratio": 0.9 })
+fn measured([scene, part, contestant]: [&str; 3], [quantity, unit, better]: [&str; 3], values: &Value) -> Value {
+    json!({ "scene": scene, "part": part, "contestant": contestant, "quantity": quantity, "unit": unit, "better": better, "values": values })
 }
 
-fn preset(name: &str, ms: f64, rmse: f64) -> Value {
-    let cost = json!({ "passes": [], "device_ms": times(ms), "wall_ms": times(ms), "camera_rays": 0, "rays": 1000, "skipped_rays": 0 });
-    let curve = json!([{ "frame": 4, "rays": 4000, "camera_rays": 0, "errors": errors(rmse), "unfiltered": null }]);
-    let still = json!({
-        "cost": cost, "moving_cost": cost, "curve": curve,
-        "rmse": [4.0 * rmse, 2.0 * rmse, 1.1 * rmse, rmse], "rays": [1000, 2000, 3000, 4000]
-    });
-    json!({ "preset": name, "technique": "traced", "primary": "traced", "rays_per_pixel": 1, "still": still, "rest": null, "moving": null })
+fn along(mut m: Value, axis: &str, at: f64) -> Value {
+    m["at"] = json!({ "axis": axis, "value": at });
+    m
 }
 
-/// A record of `bench ao`; times of `fast` are multiplied by `slower`.
-fn ao(slower: f64, presets: &[&str]) -> Value {
-    let all = [("larsen", 40.0, 0.2), ("fast", 5.0 * slower, 0.1), ("quality", 20.0, 0.05)];
-    let results: Vec<Value> = all.iter().filter(|p| presets.contains(&p.0)).map(|p| preset(p.0, p.1, p.2)).collect();
-    let view = json!({
-        "scene": "builtin:stairs", "view": "near", "primitives": 12, "reach": 1.5, "eye": [0, 0, 0], "towards": [0, 0, 1],
-        "covered": 1000, "reference_rmse": 0.01, "results": results, "verdict": {"filter_raises": []}
-    });
+fn record(benchmark: &str, settings: &Value, measurements: &[Value]) -> Value {
     json!({
-        "benchmark": "ao", "version": "0.1.0", "device": "a device", "driver": "a driver", "cpu": "a processor", "threads": 2,
-        "tracer": "compute", "size": [64, 36], "frames": 4, "reference_rays": 64, "falloff": "exponential",
-        "views": [view], "changes": [], "structures": [], "series": [], "stopped_early": false, "notes": ["a note"]
+        "benchmark": benchmark, "version": "0.1.0", "device": "a device", "driver": "a driver", "cpu": "a processor", "threads": 2,
+        "settings": settings, "measurements": measurements, "notes": ["a note"]
     })
 }
 
-/// A record of `bench rays`, whose repeats take these seconds; as versions without `--baseline` wrote it.
-fn rays(seconds: [f64; 5]) -> Value {
-    let rate = 1e6 / seconds[2] / 1e6;
-    let run = json!({
-        "contestant": "wide", "rays": 1_000_000, "hit_share": 0.5, "device": {"median": rate, "min": 0.9 * rate, "max": 1.1 * rate}, "wall": null,
-        "seconds": seconds, "ratios": [], "nodes_per_ray": 9.5, "leaves_per_ray": 1.5
-    });
-    let build = json!({ "contestant": "wide", "build_seconds": 0.1, "upload_seconds": 0.1, "bytes_per_primitive": 60.0, "sah_cost": null });
-    let scene = json!({
-        "scene": "builtin:terrain:1000", "triangles": 1000, "spheres": 0, "instances": 1, "stored_primitives": 1000, "ao_radius": null,
-        "light": [0, 1, 0], "builds": [build], "checks": [],
-        "streams": [{ "stream": "primary", "rays": 1_000_000, "results": [run] }]
-    });
-    json!({
-        "version": "0.1.0", "device": "a device", "driver": "a driver", "threads": 2, "repeats": 5, "build": "default", "peers": [],
-        "baselines": [], "scenes": [scene], "scaling": [], "stopped_early": false, "notes": []
-    })
+/// A record of `bench frames`; times of `fast` are multiplied by `slower`.
+fn frames(slower: f64, presets: &[&str]) -> Value {
+    let mut all = Vec::new();
+    for (preset, ms, rmse) in [("larsen", 40.0, 0.2), ("fast", 5.0 * slower, 0.1), ("quality", 20.0, 0.05)] {
+        let row = ["builtin:stairs, near", "still", preset];
+        let mut own = vec![
+            measured(row, ["time", "ms", "less"], &times(ms)),
+            measured(["builtin:stairs, near", "still, camera rays", preset], ["time", "ms", "less"], &times(ms)),
+            measured(row, ["RMSE", "", "less"], &json!(rmse)),
+            measured(row, ["corrected RMSE", "", "neither"], &json!(0.9 * rmse)),
+        ];
+        let frame = |k: f64| along(measured(row, ["RMSE", "", "neither"], &json!(4.0 * rmse / k)), "frame", k);
+        own.extend([frame(1.0), frame(4.0)]);
+        all.extend(own.into_iter().filter(|_| presets.contains(&preset)));
+    }
+    all.push(measured(["builtin:stairs, near", "still", "reference"], ["RMSE", "", "neither"], &json!(0.01)));
+    let mut record = record("frames", &json!({ "tracer": "compute", "size": "64x36", "frames": "4" }), &all);
+    record["scenes"] = json!([{ "scene": "builtin:stairs, near", "about": "12 primitives", "remarks": [] }]);
+    record
+}
+
+/// A record of `bench rays`, whose rates have these quartiles.
+fn rays([p25, median, p75]: [f64; 3]) -> Value {
+    let rates = json!({ "median": median, "p5": p25, "p25": p25, "p75": p75, "p95": p75, "count": 5 });
+    let rate = |scene: &str, size: f64| {
+        along(measured([scene, "primary", "wide"], ["rate", "Mrays/s", "more"], &rates), "triangles and spheres", size)
+    };
+    let all = [rate("builtin:terrain:1000", 1000.0), rate("builtin:terrain:9000", 9000.0)];
+    record("rays", &json!({ "rays": "64x36", "build": "default" }), &all)
 }
 
 /// A record of `bench path`.
 fn path() -> Value {
-    let point = |spp: u32, t: f64, rmse: f64| {
-        json!({
-            "spp": spp, "seconds": {"median": t, "min": 0.95 * t, "max": 1.1 * t}, "repeats": [0.95 * t, t, 1.1 * t], "rmse": rmse,
-            "rmse_repeats": [0.97 * rmse, rmse, 1.02 * rmse, rmse], "unsure": false, "bad_pixels": 0.0
-        })
-    };
-    let result = |name: &str, k: f64| {
-        json!({
-            "name": name, "engine": "skylit", "points": [point(1, 0.1, k), point(4, 0.4, 0.5 * k)], "bias_sigmas": null, "mpaths": 1.0, "mrays": 3.0,
-            "efficiency": 10.0, "longest_launch": null, "seconds_to_target": null
-        })
-    };
-    let references = json!([{ "engine": "skylit", "spp": 4096, "seconds": 10.0, "rmse": 0.004, "mean": 0.5 }]);
-    let scene = json!({
-        "scene": "cornell", "size": [64, 64], "triangles": 36, "spheres": 0, "lights": 1, "environment": "none", "references": references,
-        "differences": [], "target": null, "results": [result("mis", 0.1), result("uniform", 0.8)]
-    });
-    json!({
-        "benchmark": "path", "version": "0.1.0", "device": "a device", "driver": "a driver", "cpu": "", "threads": 2, "tracer": "compute",
-        "repeats": 3, "peers": [], "scenes": [scene], "stopped_early": false, "notes": []
-    })
+    let mut all = Vec::new();
+    for (name, k) in [("mis", 0.1), ("uniform", 0.8)] {
+        for (spp, t, rmse) in [(1.0, 0.1, k), (4.0, 0.4, 0.5 * k)] {
+            let row = ["cornell", "images", name];
+            all.push(along(measured(row, ["time", "s", "less"], &times(t)), "samples per pixel", spp));
+            all.push(along(measured(row, ["RMSE", "", "less"], &times(rmse)), "samples per pixel", spp));
+        }
+    }
+    record("path", &json!({ "tracer": "compute", "size": "64x64" }), &all)
 }
 
 struct Records {
@@ -112,12 +99,14 @@ const ALL: [&str; 3] = ["larsen", "fast", "quality"];
 #[test]
 fn wrong_usage() {
     let records = Records::new();
-    let file = records.with("ao.json", &ao(1.0, &ALL));
+    let file = records.with("frames.json", &frames(1.0, &ALL));
     fails(&report(&[]), 64, &["RECORD.json"]);
     fails(&report(&["/nonexistent.json"]), 3, &["/nonexistent.json", "no such file"]);
-    let broken = records.with("broken.json", &json!({"scenes": 3}));
+    let broken = records.with("broken.json", &json!({"benchmark": 3, "measurements": 3}));
     fails(&report(&[&broken]), 3, &["broken.json", "is no record of `skylit bench`"]);
-    fails(&report(&[&file, "--plot", "a.pdf"]), 64, &[".png or .svg"]);
+    fails(&report(&[&file, "--plot", "a.png"]), 64, &["must end in .svg"]);
+    let old = records.with("old.json", &json!({"benchmark": "ao", "views": []}));
+    fails(&report(&[&old]), 3, &["old.json", "is a record of an earlier version of `skylit bench`", "measure again"]);
     let other = records.with("path.json", &path());
     fails(&report(&[&file, "--baseline", &other]), 64, &["path.json", "`skylit bench path`"]);
 }
@@ -127,7 +116,7 @@ fn wrong_usage() {
 fn a_json_file_is_no_scene() {
     let records = Records::new();
     let file = records.with("a.json", &json!({}));
-    for benchmark in ["ao", "rays", "path"] {
+    for benchmark in ["ao", "frames", "rays", "path"] {
         fails(&run(&["bench", benchmark, &file]), 64, &["a JSON file is no scene", &format!("--json={file}")]);
         // behind --json it is the file: what is wrong is the scene
         let out = run(&["bench", benchmark, "--json", &file, "builtin:nothing"]);
@@ -140,35 +129,32 @@ fn a_json_file_is_no_scene() {
 #[test]
 fn saved_records_are_shown_and_plotted() {
     let records = Records::new();
-    let files =
-        [("ao.json", ao(1.0, &ALL)), ("rays.json", rays([0.1; 5])), ("path.json", path())].map(|(n, r)| records.with(n, &r));
-    let (svg, png) = (records.at("a.svg"), records.at("a.png"));
+    let files = [("frames.json", frames(1.0, &ALL)), ("rays.json", rays([9.9, 10.0, 10.1])), ("path.json", path())]
+        .map(|(n, r)| records.with(n, &r));
+    let svg = records.at("a.svg");
     let out = report(&[&files[0], &files[1], &files[2], "--plot", &svg]);
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
-    for part in ["builtin:stairs, near", "builtin:terrain:1000: 1,000 triangles", "cornell: 64x64", "note: a note"] {
+    for part in ["builtin:stairs, near:\n  12 primitives", "rate, Mrays/s", "cornell:", "note: a note"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let drawn = std::fs::read_to_string(&svg).unwrap();
     assert!(drawn.starts_with("<svg") && drawn.trim_end().ends_with("</svg>"));
     for part in
-        ["still camera", "error against time", "quality", "larsen", "Pareto front", "dominated", "primary", "cornell, 64x64"]
+        ["still: time against error", "error over time", "quality", "larsen", "Pareto front", "primary", "cornell, images"]
     {
         assert!(drawn.contains(part), "{part}");
     }
     // presets of which nothing was measured have no place in the legend
     assert!(!drawn.contains("balanced"));
-    assert!(report(&[&files[0], "--plot", &png, "--quiet"]).status.success());
-    let image = skylit::output::load(Path::new(&png)).unwrap();
-    assert!(image.width > 1000 && image.height > 600);
 }
 
 #[test]
 fn a_page_has_everything() {
     let records = Records::new();
-    let files =
-        [("ao.json", ao(1.2, &ALL)), ("rays.json", rays([0.1; 5])), ("path.json", path())].map(|(n, r)| records.with(n, &r));
-    let before = records.with("before.json", &ao(1.0, &ALL));
+    let files = [("frames.json", frames(1.2, &ALL)), ("rays.json", rays([9.9, 10.0, 10.1])), ("path.json", path())]
+        .map(|(n, r)| records.with(n, &r));
+    let before = records.with("before.json", &frames(1.0, &ALL));
     let dir = records.at("page");
     let out = report(&[&files[0], &files[1], &files[2], "--baseline", &before, "--html", &dir]);
     // written although something is worse
@@ -179,12 +165,12 @@ fn a_page_has_everything() {
     let page = std::fs::read_to_string(Path::new(&dir).join("index.html")).unwrap();
     for part in [
         "a processor",
-        "Real-time ambient occlusion: builtin:stairs, near",
+        "Frames in real time: builtin:stairs, near",
         "Path tracing: cornell",
         "Ray tracing: builtin:terrain:1000",
         "2 results are worse than in",
         "Worse beyond noise",
-        "builtin:stairs, near, fast",
+        "builtin:stairs, near, still, fast",
         "Pareto front",
         "a note",
         "skylit bench report",
@@ -200,9 +186,9 @@ fn a_page_has_everything() {
 #[test]
 fn noise_is_no_regression_and_a_slowdown_is() {
     let records = Records::new();
-    let before = records.with("before.json", &ao(1.0, &ALL));
-    let noisy = records.with("noisy.json", &ao(1.03, &ALL));
-    let slower = records.with("slower.json", &ao(1.2, &ALL));
+    let before = records.with("before.json", &frames(1.0, &ALL));
+    let noisy = records.with("noisy.json", &frames(1.03, &ALL));
+    let slower = records.with("slower.json", &frames(1.2, &ALL));
 
     let out = report(&[&noisy, "--baseline", &before]);
     assert!(out.status.success(), "{}", stderr(&out));
@@ -210,19 +196,16 @@ fn noise_is_no_regression_and_a_slowdown_is() {
     assert!(text.contains("9 results compared, 0 worse, 0 better beyond noise"), "{text}");
 
     let out = report(&[&slower, "--baseline", &before]);
-    fails(&out, 1, &["2 results are worse than in", "builtin:stairs, near, fast", "20.0 % worse"]);
+    fails(&out, 1, &["2 results are worse than in", "builtin:stairs, near, still", "20.0 % worse"]);
     let text = String::from_utf8(out.stdout).unwrap();
-    assert!(text.contains("ms a frame with camera rays") && text.contains("4 standard errors"), "{text}");
+    assert!(text.contains("still, camera rays, fast") && text.contains("4 standard errors"), "{text}");
 
     let record = serde_json::from_slice::<Value>(&report(&[&slower, "--baseline", &before, "--json"]).stdout).unwrap();
-    assert_eq!((record["exit_code"].as_u64(), record["records"][0]["benchmark"].as_str()), (Some(1), Some("ao")));
+    assert_eq!((record["exit_code"].as_u64(), record["records"][0]["benchmark"].as_str()), (Some(1), Some("frames")));
     let regressions = record["records"][0]["baseline"]["regressions"].as_array().unwrap();
     assert_eq!(regressions.len(), 2);
     for r in regressions {
-        assert_eq!(
-            (r["row"].as_str(), r["before"].as_f64(), r["now"].as_f64()),
-            (Some("builtin:stairs, near, fast"), Some(5.0), Some(6.0))
-        );
+        assert_eq!((r["quantity"].as_str(), r["before"].as_f64(), r["now"].as_f64()), (Some("time, ms"), Some(5.0), Some(6.0)));
         assert!((r["worse_by"].as_f64().unwrap() - 0.2).abs() < 1e-9 && r["noise"].as_f64().unwrap() < 0.1);
     }
     // and the other way round it is better
@@ -231,37 +214,36 @@ fn noise_is_no_regression_and_a_slowdown_is() {
 }
 
 #[test]
-fn rates_of_records_without_quartiles_are_judged_by_their_repeats() {
+fn rates_are_worse_where_they_are_less() {
     let records = Records::new();
-    let before = records.with("before.json", &rays([0.100, 0.101, 0.099, 0.102, 0.098]));
-    let slower = records.with("slower.json", &rays([0.125, 0.126, 0.124, 0.127, 0.123]));
-    let wild = records.with("wild.json", &rays([0.09, 0.2, 0.101, 0.08, 0.15]));
-    fails(
-        &report(&[&slower, "--baseline", &before]),
-        1,
-        &["1 result is worse", "builtin:terrain:1000, primary, wide, Mrays/s"],
-    );
+    let before = records.with("before.json", &rays([9.9, 10.0, 10.1]));
+    let slower = records.with("slower.json", &rays([7.9, 8.0, 8.1]));
+    let wild = records.with("wild.json", &rays([6.0, 8.0, 12.0]));
+    let worst = "builtin:terrain:1000, primary, wide, rate, Mrays/s";
+    fails(&report(&[&slower, "--baseline", &before]), 1, &["2 results are worse", worst]);
     assert!(report(&[&wild, "--baseline", &before]).status.success());
+    assert!(report(&[&before, "--baseline", &slower]).status.success());
 }
 
 #[test]
 fn what_is_missing_is_named_and_another_machine_is_a_warning() {
     let records = Records::new();
-    let before = records.with("before.json", &ao(1.0, &ALL));
-    let mut fewer = ao(1.0, &["larsen", "fast"]);
+    let before = records.with("before.json", &frames(1.0, &ALL));
+    let mut fewer = frames(1.0, &["larsen", "fast"]);
     fewer["cpu"] = json!("another processor");
     let fewer = records.with("fewer.json", &fewer);
     let out = report(&[&fewer, "--baseline", &before]);
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(
-        text.contains("in the baseline, but not in this run (3)") && text.contains("builtin:stairs, near, quality: RMSE"),
+        text.contains("in the baseline, but not in this run (3)")
+            && text.contains("builtin:stairs, near, still, quality: RMSE"),
         "{text}"
     );
     assert!(stderr(&out).contains("its processor is 'a processor', not 'another processor'"), "{}", stderr(&out));
 
-    let mut larger = ao(1.0, &ALL);
-    larger["size"] = json!([128, 72]);
+    let mut larger = frames(1.0, &ALL);
+    larger["settings"]["size"] = json!("128x72");
     let larger = records.with("larger.json", &larger);
     fails(&report(&[&larger, "--baseline", &before]), 64, &["its size is 64x36, not 128x72"]);
 }

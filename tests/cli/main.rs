@@ -23,6 +23,7 @@ mod info;
 #[cfg(unix)]
 mod limits;
 mod manners;
+mod measured;
 mod outputs;
 mod program;
 #[cfg(unix)]

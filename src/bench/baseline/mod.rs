@@ -1,28 +1,23 @@
 //! `--baseline`: the results of a run beside those of an earlier one, so that what became worse beyond noise is found.
 
-mod rule;
 mod table;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::record::BenchKind;
-use super::record::saved::SavedRecord;
-use super::record::snapshot::{Measurement, Snapshot};
-use super::table::Block;
+use super::record::{BenchKind, Better, Measurement, Record};
 use crate::error::{Error, Result};
+use crate::measure::regression::{Judged, Judgement, RULE, judge};
 use crate::measure::stats::median;
-use rule::{Judgement, judge};
-
-/// The rule, in a sentence, as reports say it.
-pub const RULE: &str = rule::TEXT;
+use crate::report::Part;
 
 /// An earlier record.
 #[derive(Clone, Debug)]
 pub struct Baseline {
     path: PathBuf,
-    before: Snapshot,
+    before: Record,
 }
 
 /// How a run compares with an earlier one.
@@ -61,7 +56,7 @@ pub struct Change {
     /// What it was measured of.
     pub row: String,
     /// Quantity and unit.
-    pub quantity: &'static str,
+    pub quantity: String,
     /// Median of the baseline.
     pub before: f64,
     /// Median of this run.
@@ -74,11 +69,8 @@ pub struct Change {
 
 impl Baseline {
     /// Reads an earlier record.
-    ///
-    /// # Errors
-    /// Those of [`SavedRecord::read`].
     pub fn read(path: &Path) -> Result<Self> {
-        Ok(Self { path: path.to_owned(), before: SavedRecord::read(path)?.snapshot() })
+        Ok(Self { path: path.to_owned(), before: Record::read(path)? })
     }
 
     /// Its file.
@@ -88,21 +80,22 @@ impl Baseline {
 
     /// The benchmark that it is of.
     pub fn kind(&self) -> BenchKind {
-        self.before.kind
+        self.before.benchmark
     }
 
     /// Is it of the same benchmark with the same settings as a run?
     ///
     /// # Errors
     /// [`Error::Usage`] that says what differs.
-    pub fn check(&self, now: &Snapshot) -> Result<()> {
+    pub fn check(&self, now: &Record) -> Result<()> {
         let refuse = |why: String| Err(Error::Usage(format!("--baseline {}: {why}", self.path.display())));
-        if self.before.kind != now.kind {
-            let [before, now] = [self.before.kind, now.kind].map(|k| k.name());
+        if self.before.benchmark != now.benchmark {
+            let [before, now] = [self.before.benchmark, now.benchmark].map(BenchKind::name);
             return refuse(format!("it is a record of `skylit bench {before}`, this is `skylit bench {now}`"));
         }
-        for ((name, before), (_, now)) in self.before.settings.iter().zip(&now.settings) {
-            if before != now && !before.is_empty() && !now.is_empty() {
+        for (name, before) in &self.before.settings {
+            let Some(now) = now.settings.get(name) else { continue };
+            if before != now {
                 return refuse(format!("its {name} is {before}, not {now}: measure both with the same options"));
             }
         }
@@ -110,10 +103,15 @@ impl Baseline {
     }
 
     /// Compares a run with it.
-    pub fn compare(&self, now: &Snapshot) -> BaselineReport {
-        let find = |of: &Measurement, among: &[Measurement]| -> Option<usize> {
-            among.iter().position(|m| m.row == of.row && m.quantity == of.quantity)
+    pub fn compare(&self, now: &Record) -> BaselineReport {
+        let compared = |record: &'_ Record| -> Vec<Measurement> {
+            record.measurements.iter().filter(|m| m.better != Better::Neither).cloned().collect()
         };
+        let [befores, nows] = [compared(&self.before), compared(now)];
+        let by_key = |all: &[Measurement]| -> HashMap<(String, String), usize> {
+            all.iter().enumerate().map(|(k, m)| ((m.row(), m.title()), k)).collect()
+        };
+        let [in_before, in_now] = [&befores, &nows].map(|all| by_key(all));
         let mut report = BaselineReport {
             file: self.path.display().to_string(),
             version: self.before.host.version.clone(),
@@ -122,14 +120,17 @@ impl Baseline {
             ..BaselineReport::default()
         };
         let mut changes = Vec::new();
-        for before in &self.before.results {
-            let Some(k) = find(before, &now.results) else {
-                report.missing.push(format!("{}: {}", before.row, before.quantity));
+        for before in &befores {
+            let Some(k) = in_now.get(&(before.row(), before.title())) else {
+                report.missing.push(format!("{}: {}", before.row(), before.title()));
                 continue;
             };
-            let now = &now.results[k];
+            let now = &nows[*k];
             report.compared += 1;
-            let (judgement, change) = judge(before, now);
+            let Judged { judgement, worse_by, noise } = judge(&before.values, &now.values, now.better == Better::More);
+            let [before_value, now_value] = [before, now].map(|m| m.values.middle());
+            let (row, quantity) = (now.row(), now.title());
+            let change = Change { row, quantity, before: before_value, now: now_value, worse_by, noise };
             if before.values.is_repeated() && change.worse_by.is_finite() {
                 changes.push(change.worse_by);
             }
@@ -141,14 +142,14 @@ impl Baseline {
                 Judgement::Unknown => report.not_judged += 1,
             }
         }
-        report.new = now.results.iter().filter(|m| find(m, &self.before.results).is_none()).count();
+        report.new = nows.iter().filter(|m| !in_before.contains_key(&(m.row(), m.title()))).count();
         report.typical_change = median(&changes);
         report.regressions.sort_by(|a, b| b.worse_by.total_cmp(&a.worse_by));
         report.improvements.sort_by(|a, b| a.worse_by.total_cmp(&b.worse_by));
         report
     }
 
-    fn warnings(&self, now: &Snapshot) -> Vec<String> {
+    fn warnings(&self, now: &Record) -> Vec<String> {
         let (a, b) = (&self.before.host, &now.host);
         let threads = [a, b].map(|h| h.threads.to_string());
         let pairs = [
@@ -168,8 +169,8 @@ impl Baseline {
 
 impl BaselineReport {
     /// All of it, for people.
-    pub fn blocks(&self) -> Vec<Block> {
-        table::blocks(self)
+    pub fn parts(&self) -> Vec<Part> {
+        table::parts(self)
     }
 
     /// Fails if anything is worse beyond noise.
@@ -195,22 +196,33 @@ impl BaselineReport {
 #[cfg(test)]
 mod tests {
     use super::super::record::HostInfo;
-    use super::super::record::snapshot::Values;
     use super::*;
+    use crate::measure::regression::Values;
     use crate::measure::stats::Percentiles;
 
     fn result(row: &str, values: &[f64]) -> Measurement {
         let values = Values::Repeated(Percentiles::of(values).unwrap());
-        Measurement { row: row.into(), quantity: "ms", values, more_is_better: false, is_peers: false }
+        Measurement {
+            scene: row.into(),
+            part: String::new(),
+            contestant: String::new(),
+            at: None,
+            quantity: "ms".into(),
+            unit: String::new(),
+            better: Better::Less,
+            is_peers: false,
+            values,
+        }
     }
 
-    fn snapshot(results: Vec<Measurement>) -> Snapshot {
+    fn run(measurements: Vec<Measurement>) -> Record {
         let host = HostInfo { device: "a".into(), cpu: "x".into(), ..HostInfo::default() };
-        Snapshot { kind: BenchKind::Ao, host, settings: vec![("size", "8x4".into())], results }
+        let settings = [("size".to_owned(), "8x4".to_owned())].into();
+        Record { benchmark: BenchKind::Frames, host, settings, measurements, ..Record::default() }
     }
 
     fn baseline(results: Vec<Measurement>) -> Baseline {
-        Baseline { path: "before.json".into(), before: snapshot(results) }
+        Baseline { path: "before.json".into(), before: run(results) }
     }
 
     /// Repeats around a median that differ by a few per cent.
@@ -221,11 +233,11 @@ mod tests {
     #[test]
     fn a_slowdown_is_found_and_noise_is_not() {
         let before = baseline(vec![result("a", &around(10.0)), result("b", &around(5.0)), result("c", &around(1.0))]);
-        let now = snapshot(vec![result("a", &around(10.2)), result("b", &around(6.0)), result("c", &around(0.8))]);
+        let now = run(vec![result("a", &around(10.2)), result("b", &around(6.0)), result("c", &around(0.8))]);
         let report = before.compare(&now);
         assert_eq!((report.compared, report.regressions.len(), report.improvements.len()), (3, 1, 1));
         let worst = &report.regressions[0];
-        assert_eq!((worst.row.as_str(), worst.quantity), ("b", "ms"));
+        assert_eq!((worst.row.as_str(), worst.quantity.as_str()), ("b", "ms"));
         assert!((worst.worse_by - 0.2).abs() < 1e-9 && worst.noise >= 0.05);
         assert!((report.typical_change.unwrap() - 0.02).abs() < 1e-9);
         let error = report.verdict().unwrap_err();
@@ -240,30 +252,30 @@ mod tests {
     #[test]
     fn what_is_missing_is_named() {
         let report = baseline(vec![result("a", &around(1.0)), result("b", &around(1.0))])
-            .compare(&snapshot(vec![result("b", &around(1.0)), result("c", &around(1.0))]));
+            .compare(&run(vec![result("b", &around(1.0)), result("c", &around(1.0))]));
         assert_eq!((report.missing.as_slice(), report.new, report.compared), (&["a: ms".to_owned()][..], 1, 1));
-        assert!(report.blocks().contains(&Block::line("    a: ms")), "{:?}", report.blocks());
+        assert!(crate::bench::table::lines(&report.parts()).iter().any(|l| l.trim() == "a: ms"));
     }
 
     #[test]
     fn another_programs_results_do_not_fail_a_run() {
         let theirs = |median| Measurement { is_peers: true, ..result("peer", &around(median)) };
-        let report = baseline(vec![theirs(1.0)]).compare(&snapshot(vec![theirs(2.0)]));
+        let report = baseline(vec![theirs(1.0)]).compare(&run(vec![theirs(2.0)]));
         assert!(report.verdict().is_ok() && report.worse_peers.len() == 1);
     }
 
     #[test]
     fn another_machine_is_a_warning_and_other_settings_an_error() {
         let before = baseline(vec![result("a", &around(1.0))]);
-        let mut now = snapshot(Vec::new());
+        let mut now = run(Vec::new());
         now.host.cpu = "y".into();
         let warnings = before.compare(&now).warnings;
         assert!(warnings.len() == 1 && warnings[0].contains("its processor is 'x', not 'y'"), "{warnings:?}");
         assert!(before.check(&now).is_ok());
-        now.settings[0].1 = "16x8".into();
+        now.settings.insert("size".into(), "16x8".into());
         let error = before.check(&now).unwrap_err();
         assert!(error.exit_code() == 64 && error.to_string().contains("its size is 8x4, not 16x8"), "{error}");
-        now.kind = BenchKind::Rays;
-        assert!(before.check(&now).unwrap_err().to_string().contains("record of `skylit bench ao`"));
+        now.benchmark = BenchKind::Rays;
+        assert!(before.check(&now).unwrap_err().to_string().contains("record of `skylit bench frames`"));
     }
 }

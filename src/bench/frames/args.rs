@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
+use super::candidates::{CANDIDATES, Candidate};
 use crate::bench::common::CommonArgs;
+use crate::bench::session::Session;
 use crate::error::{Error, Result};
 use crate::integrators::{self, IntegratorName};
 use crate::output::parse_size;
-use crate::realtime::{Preset, Technique};
+use crate::realtime::Preset;
 use crate::renderer::frames::is_ambient_occlusion;
 use crate::settings::Capability;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
@@ -21,52 +23,107 @@ const QUICK_SIZE: [u32; 2] = [64, 36];
 const DEFAULT_FRAMES: u32 = 72;
 /// The default with `--quick`.
 const QUICK_FRAMES: u32 = 16;
-/// Default paths per pixel of the reference of a still camera.
+/// Default samples per pixel of the reference of a still camera.
 const DEFAULT_REFERENCE_PATHS: u32 = 1024;
 /// The default with `--quick`.
 const QUICK_REFERENCE_PATHS: u32 = 128;
 /// Paths of a reference of a frame in motion, relative to those of a still camera: the errors are larger, and the references several.
 const MOVING_SHARE: f64 = 0.25;
+/// Default timed updates of each acceleration structure.
+const DEFAULT_REPEATS: u32 = 9;
+/// The default with `--quick`.
+const QUICK_REPEATS: u32 = 3;
 
 /// A part of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
     /// Static camera: time, error after 1, 2, 4, ... frames, flicker
     Still,
+    /// Ambient occlusion, static camera, with sampling stopped once histories are full
+    Rest,
     /// Orbiting camera
     Moving,
     /// Turning environment map, where the scene has one
     Sun,
-    /// The scene's first animation, if it has any
+    /// Objects that move: the scene's first animation, or the box of `room` that slides
     Animation,
-    /// Environment map turned at once, camera stepping aside: lag, ghosting, disocclusion
+    /// Environment map turned at once, camera stepping aside, box appearing: lag, ghosting, disocclusion
     Change,
+    /// Ambient occlusion: `balanced` with as many rays as fit the time of `larsen`
+    EqualTime,
     /// Time of frames at 1 to 4 bounces, beside Coello (2024)
     Bounces,
+    /// Updates of acceleration structures
+    Structures,
+}
+
+/// A number that is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Series {
+    /// One terrain of 10^4 to 10^7 triangles, and 2.5*10^7 by instancing
+    Triangles,
+    /// 1 to 64 rays, or paths, per pixel
+    Rays,
+    /// 320x180 to 1920x1080
+    Resolution,
+    /// Every sample sequence of ambient occlusion
+    Sampling,
+}
+
+/// From where a scene is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ViewChoice {
+    /// The scene's own camera, or as `render` would choose; of well-known scenes the near one
+    Near,
+    /// A framing of the whole scene; of well-known scenes the far one
+    Far,
+}
+
+impl ViewChoice {
+    /// In tables.
+    pub fn name(self) -> &'static str {
+        if self == Self::Near { "near" } else { "far" }
+    }
+}
+
+/// Falloff of occlusion with distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FalloffChoice {
+    /// Exponential: a hit at the scene's occlusion radius counts 1/255 of a near one
+    Exponential,
+    /// Binary: hits count fully up to the scene's occlusion radius, and not at all beyond
+    Binary,
 }
 
 const EXAMPLES: &str = "\
 Examples:
   skylit bench frames --quick                            # does everything work?
   skylit bench frames scene.glb --presets balanced --parts still,moving
-  skylit bench frames --integrator ao-sky --html report";
+  skylit bench frames --integrator ao --series rays,resolution scene.glb --html report";
 
 /// `skylit bench frames`.
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct BenchFramesArgs {
-    /// Scenes: as `render` takes them, or interior (the built-in atrium with one lamp)
-    /// [default: the Cornell box with matte blocks, a mirror and a sphere of glass, interior, parade, and Sponza and FlightHelmet if available]
+    /// Scenes: as `render` takes them, interior (the built-in atrium with one lamp), or room (a box appears and slides)
+    /// [default: of light the Cornell box with matte blocks, a mirror and a sphere of glass, interior, parade, and Sponza and FlightHelmet if available; of ambient occlusion
+    /// all well-known scenes that are available, two large built-in ones, room and parade]
     pub scenes: Vec<String>,
-    /// Integrator
-    #[arg(long, value_name = "NAME", value_parser = integrators::parser(), default_value = "path")]
-    pub integrator: IntegratorName,
-    /// Presets, separated by commas [default: all that the integrator has, but reference]
-    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
-    pub presets: Vec<Preset>,
-    /// Parts, separated by commas [default: all; for named scenes all but bounces]
+    /// Integrator [default: path]
+    #[arg(long, value_name = "NAME", value_parser = integrators::parser())]
+    pub integrator: Option<IntegratorName>,
+    /// Presets, separated by commas; gtao is balanced with GTAO (screen space) instead of rays [default: all that the integrator has, but reference]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = candidate_names())]
+    pub presets: Vec<String>,
+    /// Parts, separated by commas [default: all; for named scenes all but bounces and structures]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
     pub parts: Vec<Part>,
+    /// Vary one number instead, the others fixed; several separated by commas
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', conflicts_with = "parts")]
+    pub series: Vec<Series>,
+    /// Views, separated by commas [default: near; of ambient occlusion near,far]
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
+    pub views: Vec<ViewChoice>,
     /// Image size in pixels [default: 160x90; 64x36 with --quick]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
@@ -79,9 +136,15 @@ pub struct BenchFramesArgs {
     /// Runs of a still camera, with seeds one after another, whose errors are averaged
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub runs: u32,
-    /// Paths per pixel of the reference of a still camera; a quarter for those of frames in motion [default: 1024; 128 with --quick]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
+    /// Paths, or occlusion rays, per pixel of the reference of a still camera; a quarter for those of frames in motion [default: 1024; 128 with --quick]
+    #[arg(long, visible_alias = "reference-rays", value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     pub reference_paths: Option<u32>,
+    /// Timed updates of each acceleration structure [default: 9; 3 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: Option<u32>,
+    /// Falloff of ambient occlusion with distance
+    #[arg(long, value_enum, default_value = "exponential")]
+    pub ao_falloff: FalloffChoice,
     /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
@@ -99,54 +162,102 @@ pub struct BenchFramesArgs {
     pub common: CommonArgs,
 }
 
+/// A run of `skylit bench frames`.
+pub type FramesSession<'a> = Session<'a, BenchFramesArgs>;
+
+fn candidate_names() -> clap::builder::PossibleValuesParser {
+    CANDIDATES.iter().map(|c| c.name).collect::<Vec<_>>().into()
+}
+
 impl BenchFramesArgs {
-    /// Checks that the integrator has frames in real time, and these presets.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// The same of ambient occlusion, unless another integrator is named.
+    pub fn of_ambient_occlusion(&self) -> Self {
+        Self { integrator: Some(self.integrator.unwrap_or_default()), ..self.clone() }
+    }
+
+    /// The integrator.
+    pub fn integrator(&self) -> IntegratorName {
+        self.integrator.or_else(|| IntegratorName::find("path")).unwrap_or_default()
+    }
+
+    /// Whether frames are of ambient occlusion.
+    pub fn is_occlusion(&self) -> bool {
+        is_ambient_occlusion(self.integrator())
+    }
+
+    /// Checks that the integrator has frames in real time, these presets, and what is varied.
     pub fn check(&self) -> Result<()> {
-        if !self.integrator.get().capabilities().contains(&Capability::RealTimeFrames) {
-            return Err(Error::Usage(format!("--integrator {}: it has no frames in real time", self.integrator.name())));
+        let name = self.integrator().name();
+        if !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames) {
+            return Err(Error::Usage(format!("--integrator {name}: it has no frames in real time")));
         }
-        match self.presets.iter().find(|p| !self.has(**p)) {
-            Some(p) => Err(Error::Usage(format!("--presets {p}: it is for ambient occlusion (--integrator ao)"))),
-            None => Ok(()),
+        let for_occlusion = |what: String| Err(Error::Usage(format!("{what}: it is for ambient occlusion (--integrator ao)")));
+        let is_foreign = |n: &&String| Candidate::find(n).is_some_and(|c| !self.has(c));
+        if let Some(preset) = self.presets.iter().find(is_foreign) {
+            return for_occlusion(format!("--presets {preset}"));
         }
+        if self.series.contains(&Series::Sampling) && !self.is_occlusion() {
+            return for_occlusion("--series sampling".into());
+        }
+        Ok(())
     }
 
     /// Is a part requested?
     pub fn wants(&self, part: Part) -> bool {
-        match self.parts.as_slice() {
-            // its scenes are its own
-            [] => part != Part::Bounces || self.scenes.is_empty() && self.integrator.can(Capability::GlobalIllumination),
-            parts => parts.contains(&part),
-        }
+        let is_here = match part {
+            Part::Rest | Part::EqualTime => self.is_occlusion(),
+            Part::Bounces => self.integrator().can(Capability::GlobalIllumination),
+            _ => true,
+        };
+        let is_named = if self.parts.is_empty() {
+            // these have scenes of their own
+            !matches!(part, Part::Bounces | Part::Structures) || self.scenes.is_empty()
+        } else {
+            self.parts.contains(&part)
+        };
+        self.series.is_empty() && is_here && is_named
     }
 
     /// Is any part requested that looks at scenes?
     pub fn wants_views(&self) -> bool {
-        Part::value_variants().iter().any(|p| *p != Part::Bounces && self.wants(*p))
+        Part::value_variants().iter().any(|p| !matches!(p, Part::Bounces | Part::Structures) && self.wants(*p))
+    }
+
+    /// Whether a still camera is measured, by which equal time is judged, too.
+    pub fn wants_still(&self) -> bool {
+        self.wants(Part::Still) || self.wants(Part::EqualTime)
     }
 
     /// Does any part show what peers render, the paths of a still camera?
     pub fn wants_peers(&self) -> bool {
-        self.integrator.can(Capability::GlobalIllumination) && self.wants(Part::Still)
+        self.integrator().can(Capability::GlobalIllumination) && self.wants(Part::Still)
     }
 
-    fn has(&self, preset: Preset) -> bool {
-        is_ambient_occlusion(self.integrator) || preset.settings().technique != Technique::Larsen
+    fn has(&self, candidate: &Candidate) -> bool {
+        self.is_occlusion() || !candidate.is_for_occlusion_alone()
     }
 
     /// The presets to compare, in the order in which they are listed to users.
-    pub fn presets(&self) -> Vec<Preset> {
-        let is_wanted = |p: &Preset| match self.presets.as_slice() {
-            // larsen's budget of rays is for ambient occlusion, and the reference is no preset to compare
-            [] => {
-                self.has(*p) && *p != Preset::Reference && (is_ambient_occlusion(self.integrator) || *p != Preset::LarsenFixed)
+    pub fn candidates(&self) -> Vec<&'static Candidate> {
+        let is_wanted = |c: &&Candidate| {
+            if self.presets.is_empty() {
+                // larsen's budget of rays is for ambient occlusion, and the reference is no preset to compare
+                let is_larsens = c.preset == Preset::LarsenFixed && !self.is_occlusion();
+                self.has(c) && c.preset != Preset::Reference && !is_larsens
+            } else {
+                self.presets.iter().any(|n| n == c.name)
             }
-            named => named.contains(p),
         };
-        Preset::ALL.iter().copied().filter(is_wanted).collect()
+        CANDIDATES.iter().filter(is_wanted).collect()
+    }
+
+    /// From where scenes are seen.
+    pub fn views(&self) -> Vec<ViewChoice> {
+        match self.views.as_slice() {
+            [] if self.is_occlusion() => vec![ViewChoice::Near, ViewChoice::Far],
+            [] => vec![ViewChoice::Near],
+            named => named.to_vec(),
+        }
     }
 
     /// Image size, pixels.
@@ -165,12 +276,17 @@ impl BenchFramesArgs {
         self.common.setting(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
     }
 
-    /// Paths per pixel of the reference of a still camera.
+    /// Timed updates of each acceleration structure.
+    pub fn repeats(&self) -> u32 {
+        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+    }
+
+    /// Samples per pixel of the reference of a still camera.
     pub fn reference_paths(&self) -> u32 {
         self.common.setting(self.reference_paths, DEFAULT_REFERENCE_PATHS, QUICK_REFERENCE_PATHS)
     }
 
-    /// Paths per pixel of the reference of a frame in motion.
+    /// Samples per pixel of the reference of a frame in motion.
     pub fn moving_reference_paths(&self) -> u32 {
         (f64::from(self.reference_paths()) * MOVING_SHARE).ceil() as u32
     }
@@ -195,22 +311,37 @@ mod tests {
     #[test]
     fn parts_by_what_is_named() {
         let all = parse(&[]);
-        assert!(all.wants(Part::Still) && all.wants(Part::Sun) && all.wants(Part::Bounces));
+        assert!(all.wants(Part::Still) && all.wants(Part::Sun) && all.wants(Part::Bounces) && all.wants(Part::Structures));
         assert!(!parse(&["a.glb"]).wants(Part::Bounces) && parse(&["a.glb"]).wants(Part::Change));
+        assert!(!parse(&["a.glb"]).wants(Part::Structures) && !all.wants(Part::EqualTime));
         let some = parse(&["--parts", "bounces"]);
         assert!(some.wants(Part::Bounces) && !some.wants_views());
         // ambient occlusion has no bounces
-        assert!(!parse(&["--integrator", "ao"]).wants(Part::Bounces));
+        let occlusion = parse(&[]).of_ambient_occlusion();
+        assert!(!occlusion.wants(Part::Bounces) && occlusion.wants(Part::Rest) && occlusion.wants_still());
+        assert!(!parse(&["--series", "rays"]).wants_views());
+        assert!(Alone::try_parse_from(["bench", "--series", "rays", "--parts", "still"]).is_err());
     }
 
     #[test]
     fn presets_of_an_integrator() {
-        let names = |extra: &[&str]| parse(extra).presets().iter().map(ToString::to_string).collect::<Vec<_>>();
+        let names = |extra: &[&str]| parse(extra).candidates().iter().map(|c| c.name).collect::<Vec<_>>();
         assert_eq!(names(&[]), ["fast", "balanced", "quality"]);
-        assert_eq!(names(&["--integrator", "ao"]), ["larsen", "larsen-fixed", "fast", "balanced", "quality"]);
+        let occlusion = ["larsen", "larsen-fixed", "fast", "balanced", "quality", "gtao"];
+        assert_eq!(names(&["--integrator", "ao"]), occlusion);
         assert_eq!(names(&["--presets", "reference,fast"]), ["fast", "reference"]);
         let wrong = |extra: &[&str]| parse(extra).check().unwrap_err().to_string();
         assert!(wrong(&["--presets", "larsen"]).contains("--presets larsen"));
+        assert!(wrong(&["--series", "sampling"]).contains("--series sampling"));
         assert!(wrong(&["--integrator", "normals"]).contains("no frames in real time"));
+    }
+
+    #[test]
+    fn ambient_occlusion_is_the_same_benchmark() {
+        let occlusion = parse(&["--reference-rays", "64"]).of_ambient_occlusion();
+        assert!(occlusion.is_occlusion() && occlusion.views().len() == 2 && occlusion.reference_paths() == 64);
+        assert_eq!(parse(&[]).views(), [ViewChoice::Near]);
+        // an integrator that is named stays
+        assert_eq!(parse(&["--integrator", "direct"]).of_ambient_occlusion().integrator().name(), "direct");
     }
 }

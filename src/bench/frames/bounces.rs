@@ -1,15 +1,17 @@
 //! Time of frames at 1 to 4 bounces, in the scenes of Coello (2024), whose frames are of one path per pixel, without any filter: beside plain accumulation.
 
-use super::FramesSession;
-use super::scenes::FramesScene;
+use super::args::FramesSession;
+use super::candidates::Candidate;
+use super::frame_log::{FrameLog, first_timed};
+use super::larsen::OURS;
+use super::scenes::{FramesScene, View};
 use super::stage::Stage;
-use super::table;
 use crate::accel::flatten::FlatScene;
-use crate::bench::frame_log::{FrameLog, first_timed};
-use crate::bench::record::frames::{BouncePoint, BouncesRecord};
+use crate::bench::record::{plain, quantity};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
-use crate::realtime::Preset;
+use crate::realtime::Settings;
+use crate::report::thousands;
 use crate::scene::{Environment, load};
 
 /// A scene, and frames per second of that work at 1, 2, ... bounces: 1920x1080 pixels on a GeForce RTX 2070 Max-Q, children of nodes in the order of the ray's signs.
@@ -41,12 +43,10 @@ const QUICK: usize = 2;
 const FRAMES: u32 = 24;
 
 /// Measures all of them.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let args = session.args;
-    let preset = args.presets.first().copied().unwrap_or(Preset::Balanced);
+    let name = args.presets.first().map_or(OURS, String::as_str);
+    let Some(candidate) = Candidate::find(name) else { return Ok(()) };
     let scenes = if args.common.quick { &SCENES[..QUICK] } else { &SCENES };
     for (k, scene) in scenes.iter().enumerate() {
         session.advance(k as f64 / scenes.len() as f64);
@@ -55,44 +55,40 @@ pub fn measure(session: &mut FramesSession) -> Result<()> {
             continue;
         }
         session.phase(format!("bounces: {}", scene.source));
-        let record = one(session, scene, preset)?;
-        session.record.bounces.push(record);
+        measure_scene(session, scene, candidate)?;
+        session.show_scene(scene.source)?;
     }
-    session.show(&table::bounces(&session.record.bounces))
+    Ok(())
 }
 
-fn one(session: &FramesSession, published: &PublishedScene, preset: Preset) -> Result<BouncesRecord> {
+fn measure_scene(session: &mut FramesSession, published: &PublishedScene, candidate: &Candidate) -> Result<()> {
     let args = session.args;
     let mut scene = load::load(published.source)?;
     // one white light around everything
     scene.environment = Environment::Uniform(glam::Vec3::ONE);
     let camera = camera::choose(&scene, &Choice::Auto, args.aspect())?;
-    let loaded = FramesScene {
-        name: published.source.to_owned(),
-        middle: camera.camera_to_world.translation,
-        camera,
-        scene,
-        light: "white".into(),
-        reach: f64::INFINITY,
-    };
+    let name = published.source.to_owned();
+    let view = View { name: name.clone(), middle: camera.camera_to_world.translation, camera };
+    let light = "white".into();
+    let loaded = FramesScene { name, scene, views: vec![view], light, reach: f64::INFINITY, mover: None };
     let flat = FlatScene::for_paths(&loaded.scene);
-    let mut points = Vec::new();
     for (bounces, fps) in (1..).zip(published.fps) {
-        let stage = Stage::new(session, &loaded, &flat, Some(bounces), None)?;
-        let mut realtime = stage.realtime_as_in_motion(preset)?;
+        let stage = Stage::new(session, (&loaded, &loaded.views[0]), &flat, args.size(), Some(bounces), None)?;
+        // frames at rest take as many paths as those in motion
+        let settings = Settings { converge: false, ..stage.settings(candidate)? };
+        let mut realtime = stage.realtime_with(candidate, settings)?;
         let mut log = FrameLog::default();
         let camera = stage.still_camera();
         for _ in 0..FRAMES {
-            log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
+            log.render_frame(&mut realtime, &stage.tracer, &camera, &[])?;
         }
         let cost = log.cost(first_timed(FRAMES));
-        points.push(BouncePoint {
-            bounces,
-            cost,
-            plain_ms: stage.plain_time.per_image + stage.plain_time.per_path,
-            coello_fps: fps,
-        });
+        let mut row = session.record.row(published.source, "bounces", candidate.name);
+        let mut at = row.at("bounces", f64::from(bounces));
+        at.repeated(quantity::FRAME_TIME, cost.time()).exact(quantity::RAYS, cost.rays);
+        at.exact(plain("plain time", "ms"), stage.plain_time.per_image + stage.plain_time.per_path);
+        at.exact(plain("Coello (2024), 1920x1080", "ms"), fps.map(|fps: f64| 1e3 / fps));
     }
-    let primitives = loaded.scene.triangle_count() + loaded.scene.sphere_count();
-    Ok(BouncesRecord { scene: loaded.name, primitives, preset: preset.to_string(), points })
+    session.record.scene(published.source).about = format!("{} primitives", thousands(loaded.primitives()));
+    Ok(())
 }

@@ -1,36 +1,33 @@
 //! `skylit bench frames`: what frames in real time of any integrator cost and how far they are from converged images, preset by preset, beside plain accumulation in
-//! the same time: standing still, moving, and after changes. docs/bench-frames.md says what is measured and how.
+//! the same time: standing still, moving, and after changes; and what varies with one number. docs/bench-frames.md says what is measured and how, docs/bench-ao.md what ambient
+//! occlusion has besides.
 
 mod args;
 mod bounces;
+mod candidates;
 mod change;
-mod displayed;
+mod frame_log;
+mod larsen;
 mod moving;
 mod peers;
 mod scenes;
+mod series;
 mod signal;
 mod stage;
 mod still;
-pub mod table;
+mod structures;
 mod views;
 
 pub use args::BenchFramesArgs;
-use args::Part;
+use args::{FalloffChoice, FramesSession, Part};
 
 use super::peers::file::{self, Measures, PeerSpec};
-use super::record::frames::FramesBenchmark;
+use super::record::{BenchKind, Record};
 use super::session::Session;
-use super::table::Block;
 use crate::error::Result;
 use crate::terminal::console::Failure;
 
-/// A run of `skylit bench frames`.
-type FramesSession<'a> = Session<'a, BenchFramesArgs, FramesBenchmark>;
-
 /// Measures, shows, writes.
-///
-/// # Errors
-/// The first that went wrong; what was measured is written all the same.
 pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     args.check()?;
     let scenes = scenes::choose(args);
@@ -38,16 +35,21 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     let specs = if args.wants_peers() { file::choose(args.peers.as_deref(), Measures::Paths)? } else { Ok(Vec::new()) };
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
     args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| FramesBenchmark {
-        host: device.host_info(),
-        tracer: args.tracer.on(device.info()).0.name().to_owned(),
-        integrator: args.integrator.name().to_owned(),
-        size: args.size(),
-        frames: args.frames(),
-        seed: args.seed,
-        runs: args.runs,
-        reference_paths: args.reference_paths(),
-        ..Default::default()
+    let mut session = Session::start(args, &args.common, |device| {
+        let [width, height] = args.size();
+        let falloff = if args.ao_falloff == FalloffChoice::Binary { "binary" } else { "exponential" };
+        let mut settings = vec![
+            ("tracer", args.tracer.on(device.info()).0.name().to_owned()),
+            ("integrator", args.integrator().name().to_owned()),
+            ("size", format!("{width}x{height}")),
+            ("frames", args.frames().to_string()),
+            ("seed", args.seed.to_string()),
+            ("runs", args.runs.to_string()),
+            ("reference paths", args.reference_paths().to_string()),
+        ];
+        settings.extend(args.is_occlusion().then(|| ("falloff", falloff.to_owned())));
+        let settings = settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        Record { benchmark: BenchKind::Frames, host: device.host_info(), settings, ..Record::default() }
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
@@ -58,16 +60,23 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
 fn measure(session: &mut FramesSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
     session.start_peers(specs)?;
     session.record.peers = session.peer_titles();
-    let title = table::title(&session.record);
-    session.show(&[Block::Line(title)])?;
-    let (views, bounces) = (session.args.wants_views(), session.args.wants(Part::Bounces));
-    let oidn = views::open_denoiser(session);
-    session.expect_jobs(if views { scenes.len() } else { 0 } + usize::from(bounces));
-    for source in scenes.iter().filter(|_| views) {
+    session.show_title()?;
+    let args = session.args;
+    let views = if args.wants_views() { scenes } else { &[] };
+    let (bounces, structures) = (args.wants(Part::Bounces), args.wants(Part::Structures));
+    let oidn = if views.is_empty() || args.is_occlusion() { None } else { views::open_denoiser(session) };
+    session.expect_jobs(views.len() + usize::from(bounces) + usize::from(structures) + args.series.len());
+    for source in views {
         session.job(source, |session| views::measure(session, source, oidn.as_ref()))?;
     }
     if bounces {
         session.job("bounces", bounces::measure)?;
+    }
+    if structures {
+        session.job("structures", structures::measure)?;
+    }
+    for series in &args.series {
+        session.job("series", |session| series::measure(session, *series, scenes))?;
     }
     Ok(())
 }

@@ -1,94 +1,144 @@
 //! Something moves in every frame: the camera, the sun, or objects.
 
-use super::FramesSession;
-use super::displayed::FrameReference;
-use super::signal::{EqualTime, PlainClock};
-use super::stage::{Motion, PLAIN_SEED, Stage, is_plain_timed};
-use crate::bench::frame_log::{FrameLog, first_timed, measured};
-use crate::bench::record::frames::{DenoisedImage, FrameErrors, MotionRecord, MovingFrames, PlainImage};
+use super::args::FramesSession;
+use super::candidates::Candidate;
+use super::change::add_ghost;
+use super::frame_log::{FrameLog, first_timed, measured};
+use super::signal::EqualTime;
+use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, Stage};
+use super::still::plain_remark;
+use crate::bench::record::{REFERENCE, plain, quantity};
 use crate::error::Result;
-use crate::realtime::Preset;
+use crate::measure::displayed::{FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, is_plain_timed};
+use crate::measure::stats::Percentiles;
+use crate::measure::temporal::Ghosting;
+use crate::realtime::surface_masks;
 
-/// Measures all presets.
-///
-/// # Errors
-/// Those of the device; Ctrl-C.
-pub fn measure(session: &mut FramesSession, name: &str, stage: &mut Stage, mut motion: Motion) -> Result<MotionRecord> {
-    let name = format!("{name}, {}", motion.name());
-    session.phase(format!("{name}: references"));
-    let mut references = Vec::new();
-    for frame in measured(session.args.frames()) {
-        let camera = stage.go(&mut motion, frame)?.camera;
-        references.push((frame, stage.reference(&camera, session.args.moving_reference_paths())?));
-    }
-    let count = references.len().max(1) as f64;
-    let mut record = MotionRecord {
-        motion: motion.name().to_owned(),
-        frames: references.iter().map(|r| r.0).collect(),
-        reference_rmse: references.iter().map(|r| r.1.rmse).sum::<f64>() / count,
-        results: Vec::new(),
-    };
-    for preset in session.args.presets() {
-        if session.is_late() && !record.results.is_empty() {
-            session.leave_out(&format!("{name}: {preset}"));
-            continue;
-        }
-        session.phase(format!("{name}: {preset}"));
-        record.results.push(one(session, stage, &mut motion, preset, &references)?);
-    }
-    // what comes after begins where everything was
-    stage.go(&mut motion, 0)?;
-    stage.rest()?;
-    Ok(record)
+/// A frame whose error is measured.
+struct Moment {
+    frame: u32,
+    reference: FrameReference,
+    /// Where objects move: the reference of the frame before, and the pixels in which both show the same surface at rest.
+    before: Option<(FrameReference, Vec<f32>)>,
 }
 
-fn one(
-    session: &FramesSession,
+/// Measures all presets.
+pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut motion: Motion) -> Result<()> {
+    let (part, paths) = (motion.name(), session.args.moving_reference_paths());
+    session.phase(format!("{scene}, {part}: references"));
+    let mut moments = Vec::new();
+    for frame in measured(session.args.frames()) {
+        let mut before = None;
+        if motion.moves_objects() {
+            let camera = stage.move_to(&mut motion, frame.saturating_sub(1))?.camera;
+            before = Some((stage.reference(&camera, paths)?, stage.surfaces(&camera)?));
+        }
+        let camera = stage.move_to(&mut motion, frame)?.camera;
+        let reference = stage.reference(&camera, paths)?;
+        let before = match before {
+            None => None,
+            Some((old, surfaces)) => Some((old, surface_masks::unchanged(&stage.surfaces(&camera)?, &surfaces, stage.reach))),
+        };
+        moments.push(Moment { frame, reference, before });
+    }
+    let error = moments.iter().map(|m| m.reference.rmse).sum::<f64>() / moments.len().max(1) as f64;
+    for (k, candidate) in session.args.candidates().into_iter().enumerate() {
+        if session.is_over() {
+            session.leave_out(&format!("{scene}, {part}: {}", candidate.name));
+            continue;
+        }
+        session.phase(format!("{scene}, {part}: {}", candidate.name));
+        measure_preset(session, scene, stage, &mut motion, candidate, &moments)?;
+        if k == 0 {
+            session.record.row(scene, part, REFERENCE).exact(quantity::RMSE.not_compared(), error);
+        }
+    }
+    // what comes after begins where everything was
+    stage.move_to(&mut motion, 0)?;
+    stage.rest()
+}
+
+fn measure_preset(
+    session: &mut FramesSession,
+    scene: &str,
     stage: &mut Stage,
     motion: &mut Motion,
-    preset: Preset,
-    references: &[(u32, FrameReference)],
-) -> Result<MovingFrames> {
-    let frames = session.args.frames();
-    let mut realtime = stage.realtime(preset)?;
-    let (mut log, mut errors) = (FrameLog::default(), Vec::new());
-    let mut clock = PlainClock::default();
+    candidate: &Candidate,
+    moments: &[Moment],
+) -> Result<()> {
+    // the frames
+    let (frames, part) = (session.args.frames(), motion.name());
+    let mut realtime = stage.realtime(candidate)?;
+    let (mut log, mut errors, mut images) = (FrameLog::default(), Vec::new(), Vec::new());
+    let mut unfiltered = Vec::new();
+    let (mut clock, mut updates) = (PlainClock::default(), Vec::new());
     for frame in 0..frames {
-        let inputs = stage.go(motion, frame)?;
+        let inputs = stage.move_to(motion, frame)?;
+        updates.extend(inputs.update_seconds.filter(|_| frame > 0).map(|s| 1e3 * s));
         inputs.light(&mut realtime, &stage.tracer)?;
         // what the scene was before the first frame is nobody's history
         let moved = if frame == 0 { &[][..] } else { &inputs.moved };
-        log.frame(&mut realtime, &stage.tracer, &inputs.camera, moved)?;
+        log.render_frame(&mut realtime, &stage.tracer, &inputs.camera, moved)?;
         // so that structures are built anew where that pays
         stage.tracer.traced(log.seconds().last().copied().unwrap_or_default());
         if is_plain_timed(frame, first_timed(frames), frames) {
             stage.time_plain(&inputs.camera, &mut clock)?;
         }
-        if let Some((_, reference)) = references.iter().find(|r| r.0 == frame) {
-            errors.push(reference.errors_of(&realtime.result()?)?);
+        if let Some(m) = moments.iter().find(|m| m.frame == frame) {
+            let image = realtime.result()?;
+            errors.push(m.reference.errors_of(&image)?);
+            if stage.channels() == 1 {
+                unfiltered.push(m.reference.errors_of(&realtime.unfiltered()?)?);
+            }
+            images.push(image);
         }
     }
+
+    // plain accumulation in the time of the last one: the first has other samples
     let cost = log.cost(first_timed(frames));
-    // the last one: the first has other samples
     let typical = log.typical(first_timed(frames)).pop();
     let time = EqualTime::new(clock.time(), typical.into_iter().collect());
-    let (mut plain, mut denoised) = (Vec::new(), Vec::new());
-    for (frame, reference) in references {
-        let camera = stage.go(motion, *frame)?.camera;
-        plain.push(stage.plain_image(&camera, time.paths(1), reference, PLAIN_SEED + frame)?);
-        denoised.extend(stage.denoised(&camera, (&time, 1, true), reference, PLAIN_SEED + frame)?);
+    let (mut plains, mut denoised) = (Vec::new(), Vec::new());
+    for m in moments {
+        let camera = stage.move_to(motion, m.frame)?.camera;
+        plains.push(stage.plain_image(&camera, time.paths(1), &m.reference, PLAIN_SEED + m.frame)?.errors);
+        denoised.extend(stage.denoised(&camera, (&time, 1, true), &m.reference, PLAIN_SEED + m.frame)?);
     }
-    let mean = |of: Vec<FrameErrors>| FrameErrors::mean(&of).unwrap_or_default();
+    let mean = |all: &[ImageErrors]| ImageErrors::mean(all).unwrap_or_default();
     let denoised = denoised.first().map(|first: &DenoisedImage| DenoisedImage {
-        errors: mean(denoised.iter().map(|d| d.errors).collect()),
+        errors: mean(&denoised.iter().map(|d| d.errors).collect::<Vec<_>>()),
         ms: denoised.iter().map(|d| d.ms).sum::<f64>() / denoised.len() as f64,
         paths: first.paths,
     });
-    Ok(MovingFrames {
-        preset: preset.to_string(),
-        cost,
-        errors: mean(errors),
-        plain: PlainImage { paths: time.paths(1), errors: mean(plain.iter().map(|p| p.errors).collect()) },
-        denoised,
-    })
+
+    // what is left of the frame before, beside what the preset ends at when everything rests
+    let (mut ghosting, mut shares) = (Ghosting::default(), Vec::new());
+    for (m, image) in moments.iter().zip(&images) {
+        let Some((old, mask)) = &m.before else { continue };
+        let inputs = stage.move_to(motion, m.frame)?;
+        inputs.light(&mut realtime, &stage.tracer)?;
+        stage.rest()?;
+        let settled = stage.frames_afresh(&mut realtime, &inputs.camera, frames)?.pop().unwrap_or_default();
+        let [image, settled] = [image, &settled].map(|image| stage.displayed(image).coded);
+        let references = (&m.reference.displayed.coded[..], &old.displayed.coded[..]);
+        shares.extend(add_ghost(&mut ghosting, (&image, &settled), references, Some(mask)).map(|r| r.share));
+    }
+
+    // all of it into the record
+    let (errors, plain_image) = (mean(&errors), PlainImage { paths: time.paths(1), errors: mean(&plains) });
+    cost.add_to(&mut session.record, [scene, part, candidate.name]);
+    let mut row = session.record.row(scene, part, candidate.name);
+    row.errors(&errors);
+    row.exact(quantity::UNFILTERED, ImageErrors::mean(&unfiltered).map(|e| e.rmse));
+    plain_image.add_to(&mut row, &errors);
+    denoised.iter().for_each(|image| image.add_to(&mut row));
+    row.repeated(quantity::UPDATE_TIME, Percentiles::of(&updates));
+    if motion.moves_objects() {
+        let left = shares.iter().sum::<f64>() / shares.len() as f64;
+        row.exact(plain("left", ""), left).exact(plain("ghosting", ""), ghosting.energy());
+    }
+    let ratio = errors.over(&plain_image.errors);
+    session.record.scene(scene).remarks.extend(ratio.map(|ratio| plain_remark(candidate.name, part, ratio)));
+    Ok(())
 }

@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::FramesSession;
-use super::displayed::FrameReference;
-use super::scenes::FramesScene;
-use super::signal::{PlainClock, PlainTime, TIMED_PATHS};
-use super::stage::{REFERENCE_SEEDS, TIMED_IMAGES};
+use super::args::FramesSession;
+use super::scenes::{FramesScene, View};
+use super::stage::{PlainImage, REFERENCE_SEEDS, TIMED_IMAGES};
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::record::frames::{FrameErrors, PeerFrames, PeerPoint, PlainImage};
+use crate::bench::record::{FRAME, plain, quantity};
 use crate::error::Result;
+use crate::measure::displayed::{FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, PlainTime, TIMED_PATHS};
 
 /// Values per pixel.
 const CHANNELS: usize = 3;
@@ -34,7 +34,7 @@ pub struct PeerImages {
 #[derive(Clone, Copy)]
 struct Image {
     ms: f64,
-    errors: FrameErrors,
+    errors: ImageErrors,
 }
 
 /// Maximum number of images that are rendered to find the number of paths that takes a time.
@@ -43,42 +43,49 @@ const TRIES: usize = 3;
 const NEAR: f64 = 0.05;
 
 /// Gives all peers a scene, has them render their references, and takes their times. Those that fail are left out with a note.
-///
-/// # Errors
-/// Those of our own side; Ctrl-C.
-pub fn prepare(session: &mut FramesSession, loaded: &FramesScene) -> Result<Vec<PeerImages>> {
+pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -> Result<Vec<PeerImages>> {
     let mut images = Vec::new();
     for peer in 0..session.peers.len() {
         let name = session.peers[peer].spec.name.clone();
         session.phase(format!("{}: reference of {name}", loaded.name));
-        match of_peer(session, loaded, peer) {
+        match prepare_peer(session, (loaded, view), peer) {
             Ok(all) => images.extend(all),
-            Err(e) => left_out(session, &format!("{}: peer '{name}'", loaded.name), e)?,
+            Err(e) => leave_out(session, &format!("{}: peer '{name}'", loaded.name), e)?,
         }
     }
     Ok(images)
 }
 
-/// Images in the time of so many frames, `(frames, milliseconds)`, of every peer. One that fails is left out from here on, with a note.
-///
-/// # Errors
-/// Those of our own side; Ctrl-C.
-pub fn beside(session: &mut FramesSession, all: &mut Vec<PeerImages>, ms: &[(u32, f64)]) -> Result<Vec<PeerFrames>> {
-    let mut done = Vec::new();
+/// Adds to the record images of every peer in the time of so many frames of a preset, `(frames, milliseconds)`. One that fails is left out from here on, with a note.
+pub fn render_beside(
+    session: &mut FramesSession,
+    (scene, preset): (&str, &str),
+    all: &mut Vec<PeerImages>,
+    ms: &[(u32, f64)],
+) -> Result<()> {
     for mut images in std::mem::take(all) {
         session.phase(format!("images of {}", images.title));
-        match images.beside(&mut session.peers[images.peer], ms) {
-            Ok(frames) => {
-                done.push(frames);
+        match images.render_in(&mut session.peers[images.peer], ms) {
+            Ok(rendered) => {
+                let contestant = format!("{} in the time of {preset}", images.title);
+                let mut row = session.record.row(scene, "still, other renderers", &contestant).of_peer(true);
+                let time = images.clock.time();
+                row.exact(plain("image", "ms"), time.per_image).exact(plain("path", "ms"), time.per_path);
+                row.exact(plain("reference's RMSE", ""), images.reference.rmse);
+                for (frame, image) in rendered {
+                    let mut at = row.at(FRAME, f64::from(frame));
+                    at.exact(quantity::RMSE.not_compared(), image.errors.rmse);
+                    at.exact(quantity::CORRECTED, image.errors.corrected).exact(plain("paths", ""), f64::from(image.paths));
+                }
                 all.push(images);
             }
-            Err(e) => left_out(session, &images.title, e)?,
+            Err(e) => leave_out(session, &images.title, e)?,
         }
     }
-    Ok(done)
+    Ok(())
 }
 
-fn left_out(session: &mut FramesSession, what: &str, e: PeerError) -> Result<()> {
+fn leave_out(session: &mut FramesSession, what: &str, e: PeerError) -> Result<()> {
     match e {
         PeerError::Ours(e) => return Err(e),
         PeerError::Failed(why) => session.note(format!("{what} left out: {why}")),
@@ -86,15 +93,19 @@ fn left_out(session: &mut FramesSession, what: &str, e: PeerError) -> Result<()>
     Ok(())
 }
 
-fn of_peer(session: &mut FramesSession, loaded: &FramesScene, k: usize) -> Result<Vec<PeerImages>, PeerError> {
+fn prepare_peer(
+    session: &mut FramesSession,
+    (loaded, view): (&FramesScene, &View),
+    k: usize,
+) -> Result<Vec<PeerImages>, PeerError> {
     let (size, seed, paths) = (session.args.size(), session.args.seed, session.args.reference_paths());
     let peer = &mut session.peers[k];
-    peer.load_scene(&loaded.scene, &loaded.camera, size)?;
+    peer.load_scene(&loaded.scene, &view.camera, size)?;
     let spec = peer.spec.clone();
     let Some(first) = spec.kernels.first() else { return Ok(Vec::new()) };
     let mut half = |seed| Ok::<_, PeerError>(peer.render(first, paths.div_ceil(2), seed, size)?.1);
     let [a, b] = REFERENCE_SEEDS.map(&mut half);
-    let reference = Rc::new(FrameReference::new([&a?, &b?], CHANNELS, size[0] as usize)?);
+    let reference = Rc::new(FrameReference::new([&a?, &b?], CHANNELS, size[0] as usize, None)?);
     let mut all = Vec::new();
     for kernel in &spec.kernels {
         let mut images = PeerImages {
@@ -154,22 +165,12 @@ impl PeerImages {
         Ok(image)
     }
 
-    fn beside(&mut self, peer: &mut Peer, ms: &[(u32, f64)]) -> Result<PeerFrames, PeerError> {
+    fn render_in(&mut self, peer: &mut Peer, ms: &[(u32, f64)]) -> Result<Vec<(u32, PlainImage)>, PeerError> {
         // beside the frames that it is compared with, too
         let mut clock = std::mem::take(&mut self.clock);
         self.time(peer, &mut clock)?;
         self.clock = clock;
         let time = self.clock.time();
-        let mut points = Vec::new();
-        for &(frame, ms) in ms {
-            points.push(PeerPoint { frame, image: self.image_in(peer, time, ms)? });
-        }
-        Ok(PeerFrames {
-            peer: self.title.clone(),
-            reference_rmse: self.reference.rmse,
-            ms_per_image: time.per_image,
-            ms_per_path: time.per_path,
-            points,
-        })
+        ms.iter().map(|&(frame, ms)| Ok((frame, self.image_in(peer, time, ms)?))).collect()
     }
 }

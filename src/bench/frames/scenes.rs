@@ -1,26 +1,34 @@
 //! Which scenes are measured, what lights them, from where they are seen, and what the moving camera goes round.
 
-use std::path::Path;
+use glam::{DAffine3, DVec3};
 
-use glam::DVec3;
-
-use super::args::BenchFramesArgs;
-use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WELL_KNOWN, WellKnownScene, check_exists, sun_map};
+use super::args::{BenchFramesArgs, ViewChoice};
+use crate::bench::scenes::{
+    FLIGHT_HELMET, SPONZA, SceneList, WELL_KNOWN, WellKnownScene, check_exists, environment_text, sun_map, table_name,
+};
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::integrators::Integrator;
-use crate::scene::{Camera, Environment, Scene, light_spec, load};
+use crate::scene::builtin::moving_box::{self, Mover};
+use crate::scene::builtin::shapes;
+use crate::scene::{Camera, Environment, Geometry, Instance, Material, Mesh, Scene, light_spec, load};
 use crate::settings::Capability;
 
 /// The built-in atrium at night, with one lamp.
 const INTERIOR: &str = "interior";
 /// Its lamp: a small emitter.
 const LAMP: &str = "sphere position=-4,2.6,0.6 radius=0.12 radiance=600";
+/// A room in which a box is moved about.
+const ROOM: &str = "room";
 /// Built-in scenes of the default list.
 const BUILTIN: [&str; 5] =
     ["builtin:cornell-box", "builtin:cornell-mirror", "builtin:cornell-glass-sphere", INTERIOR, "builtin:parade"];
 /// With `--quick`.
 const QUICK: [&str; 2] = ["builtin:cornell-box", "builtin:parade"];
+/// Those of ambient occlusion, after the well-known ones.
+const OCCLUSION: [&str; 4] = ["builtin:terrain:2450000", "builtin:instances:25000000", ROOM, "builtin:parade"];
+/// With `--quick`.
+const QUICK_OCCLUSION: [&str; 3] = ["builtin:stairs", "builtin:instances:25000", ROOM];
 /// Well-known scenes of the default list.
 const FILES: [&WellKnownScene; 2] = [&SPONZA, &FLIGHT_HELMET];
 /// Material of the surface that covers Sponza's court: it is left out, so that the sun gets in.
@@ -31,18 +39,17 @@ const AHEAD: f64 = 0.05;
 /// Scenes to measure.
 pub fn choose(args: &BenchFramesArgs) -> SceneList {
     match args.scenes.as_slice() {
+        [] if args.common.quick && args.is_occlusion() => SceneList::of(&QUICK_OCCLUSION),
         [] if args.common.quick => SceneList::of(&QUICK),
+        [] if args.is_occlusion() => SceneList::well_known(&WELL_KNOWN).then(SceneList::of(&OCCLUSION)),
         [] => SceneList::of(&BUILTIN).then(SceneList::well_known(&FILES)),
         named => SceneList::of(named),
     }
 }
 
 /// Fails for a scene that is not there.
-///
-/// # Errors
-/// Those of [`check_exists`].
 pub fn check(source: &str) -> Result<()> {
-    if source == INTERIOR { Ok(()) } else { check_exists(source) }
+    if [INTERIOR, ROOM].contains(&source) { Ok(()) } else { check_exists(source) }
 }
 
 /// A scene ready to be measured.
@@ -52,50 +59,101 @@ pub struct FramesScene {
     /// The scene, lit.
     pub scene: Scene,
     /// From where it is seen.
-    pub camera: Camera,
-    /// What the moving camera goes round.
-    pub middle: DVec3,
+    pub views: Vec<View>,
     /// What lights it, in words.
     pub light: String,
     /// How far ambient occlusion reaches, scene units.
     pub reach: f64,
+    /// The box that moves, in the room.
+    pub mover: Option<Mover>,
+}
+
+/// A camera.
+pub struct View {
+    /// In tables, the name of the scene included.
+    pub name: String,
+    /// From where the scene is seen.
+    pub camera: Camera,
+    /// What the moving camera goes round.
+    pub middle: DVec3,
+}
+
+impl FramesScene {
+    /// Triangles and spheres over all instances.
+    pub fn primitives(&self) -> u64 {
+        self.scene.triangle_count() + self.scene.sphere_count()
+    }
 }
 
 /// Length of occlusion rays, diagonals of the bounds.
 const REACH: f64 = 0.25;
 
-/// Loads a scene, lights it where it is dark, and chooses its view.
-///
-/// # Errors
-/// Those of loading the scene or the environment.
+/// Side of the plane that a scene is put on, in the greatest side of the scene.
+const PLANE: f64 = 12.0;
+
+/// Loads a scene, lights it where it is dark, and chooses its views.
 pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
+    // the scene, without what would cover it and with what it stands on
     let is_interior = source == INTERIOR;
-    let mut scene = load::load(if is_interior { "builtin:atrium" } else { source })?;
+    let (mut scene, mover) = if source == ROOM {
+        let (scene, mover) = moving_box::build_room();
+        (scene, Some(mover))
+    } else {
+        (load::load(if is_interior { "builtin:atrium" } else { source })?, None)
+    };
     let known = WellKnownScene::find(&WELL_KNOWN, source);
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene(format!("{source}: nothing to look at: no geometry")))?;
-    if known.is_some_and(|k| k.path == SPONZA.path) {
+    if known.is_some_and(|k| k.path == SPONZA.path) && !args.is_occlusion() {
         let Scene { instances, meshes, materials, .. } = &mut scene;
         instances.retain(|i| materials[meshes[i.mesh].material].name != COVER);
     }
+    if known.is_some_and(|k| k.on_plane) {
+        add_plane(&mut scene, (lo, hi));
+    }
     let light = light(&mut scene, is_interior, args)?;
-    let choice = known.map_or(Choice::Auto, |k| k.near.choice());
-    let camera = camera::choose(&scene, &choice, args.aspect())?;
-    let to_world = camera.camera_to_world;
-    let eye = to_world.translation;
-    let diagonal = (hi - lo).length();
-    let is_inside = eye.cmpgt(lo).all() && eye.cmplt(hi).all();
-    let middle = match known.filter(|_| !is_inside) {
-        Some(known) => known.near.target.into(),
-        None if is_inside => eye - to_world.matrix3.z_axis.normalize_or_zero() * (AHEAD * diagonal),
-        None => (lo + hi) * 0.5,
-    };
-    let reach = known.map_or(REACH * diagonal, |k| k.reach);
-    Ok(FramesScene { name: name(source), scene, camera, middle, light, reach })
+
+    // where it is seen from
+    let name = table_name(&WELL_KNOWN, source);
+    let mut views = Vec::new();
+    for choice in args.views() {
+        let camera = match (choice, known) {
+            (ViewChoice::Near, _) => {
+                let near = known.map_or(Choice::Auto, |k| k.near.choice());
+                camera::choose(&scene, &near, args.aspect())?
+            }
+            (ViewChoice::Far, Some(known)) => known.far.camera(),
+            (ViewChoice::Far, None) => Camera::framing(lo, hi, args.aspect()),
+        };
+        let to_world = camera.camera_to_world;
+        let eye = to_world.translation;
+        let is_inside = eye.cmpgt(lo).all() && eye.cmplt(hi).all();
+        let looked_at = known.filter(|_| !is_inside);
+        let middle = match looked_at.map(|k| if choice == ViewChoice::Near { k.near } else { k.far }) {
+            Some(view) => view.target.into(),
+            None if is_inside => eye - to_world.matrix3.z_axis.normalize_or_zero() * (AHEAD * (hi - lo).length()),
+            None => (lo + hi) * 0.5,
+        };
+        let has_several = args.views().len() > 1;
+        let name = if has_several { format!("{name}, {}", choice.name()) } else { name.clone() };
+        views.push(View { name, camera, middle });
+    }
+    let reach = if mover.is_some() { moving_box::REACH } else { known.map_or(REACH * (hi - lo).length(), |k| k.reach) };
+    Ok(FramesScene { name, scene, views, light, reach, mover })
+}
+
+/// Puts a scene with these bounds on a plane.
+fn add_plane(scene: &mut Scene, (lo, hi): (DVec3, DVec3)) {
+    let middle = DVec3::new(0.5 * (lo.x + hi.x), lo.y, 0.5 * (lo.z + hi.z));
+    let geometry: Geometry = shapes::floor(middle, PLANE * (hi - lo).max_element());
+    scene.materials.push(Material { name: "plane".into(), ..Default::default() });
+    scene.meshes.push(Mesh { name: "plane".into(), geometry, material: scene.materials.len() - 1 });
+    let mesh = scene.meshes.len() - 1;
+    scene.instances.push(Instance { name: "plane".into(), mesh, object_to_world: DAffine3::IDENTITY });
 }
 
 /// Lights a scene that is dark. Returns what lights it, in words.
 fn light(scene: &mut Scene, is_interior: bool, args: &BenchFramesArgs) -> Result<String> {
-    let integrator: &dyn Integrator = args.integrator.get();
+    let integrator: &dyn Integrator = args.integrator().get();
     if !integrator.capabilities().contains(&Capability::SceneLights) {
         return Ok("none, it is not seen".into());
     }
@@ -106,17 +164,7 @@ fn light(scene: &mut Scene, is_interior: bool, args: &BenchFramesArgs) -> Result
     if scene.is_dark() || args.environment.is_some() {
         scene.environment = Environment::Map(sun_map(args.environment.as_deref(), args.common.quick)?);
     }
-    Ok(match &scene.environment {
-        Environment::Black => "its own".to_owned(),
-        Environment::Uniform(c) => format!("constant environment {},{},{}", c.x, c.y, c.z),
-        Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
-    })
-}
-
-/// In tables.
-fn name(source: &str) -> String {
-    let stem = WellKnownScene::find(&WELL_KNOWN, source).and_then(|_| Path::new(source).file_stem());
-    stem.map_or_else(|| source.to_owned(), |s| s.to_string_lossy().into_owned())
+    Ok(environment_text(&scene.environment, "its own"))
 }
 
 #[cfg(test)]
@@ -134,16 +182,36 @@ mod tests {
     #[test]
     fn every_scene_is_lit_and_has_something_to_go_round() {
         let args = Alone::try_parse_from(["bench", "--quick"]).unwrap().args;
-        for source in [INTERIOR, "builtin:parade", "builtin:cornell-box"] {
+        for source in [INTERIOR, "builtin:parade", "builtin:cornell-box", ROOM] {
             check(source).unwrap();
             let loaded = load(source, &args).unwrap();
             assert!(!loaded.scene.is_dark(), "{source}");
-            let eye = loaded.camera.camera_to_world.translation;
-            assert!(eye.distance(loaded.middle) > 0.1, "{source}");
+            let view = &loaded.views[0];
+            assert!(view.camera.camera_to_world.translation.distance(view.middle) > 0.1, "{source}");
         }
         let interior = load(INTERIOR, &args).unwrap();
         assert!(interior.scene.environment == Environment::Black && interior.light == "a lamp");
         // in the court, clear of its columns
-        assert!(interior.middle.distance(interior.camera.camera_to_world.translation) < 6.0);
+        let view = &interior.views[0];
+        assert!(view.middle.distance(view.camera.camera_to_world.translation) < 6.0);
+    }
+
+    #[test]
+    fn any_scene_has_two_views_of_ambient_occlusion() {
+        let args = Alone::try_parse_from(["bench", "--quick"]).unwrap().args.of_ambient_occlusion();
+        let loaded = load("builtin:stairs", &args).unwrap();
+        let names: Vec<_> = loaded.views.iter().map(|v| v.name.as_str()).collect();
+        assert_eq!(names, ["builtin:stairs, near", "builtin:stairs, far"]);
+        assert!(loaded.mover.is_none() && load(ROOM, &args).unwrap().mover.is_some());
+    }
+
+    #[test]
+    fn a_plane_is_under_everything() {
+        let mut scene = crate::scene::builtin::by_name("grid:2").unwrap();
+        let before = scene.bounds().unwrap();
+        add_plane(&mut scene, before);
+        let after = scene.bounds().unwrap();
+        assert_eq!(after.0.y, before.0.y);
+        assert!(after.1.x > before.1.x && scene.instances.len() == 10 && scene.meshes.len() == 3);
     }
 }

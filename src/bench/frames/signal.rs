@@ -4,14 +4,17 @@ use std::time::Instant;
 
 use glam::DMat3;
 
-use super::args::BenchFramesArgs;
+use super::args::{BenchFramesArgs, FalloffChoice};
+use super::candidates::{Candidate, Occlusion};
+use super::frame_log::TypicalFrame;
 use crate::accel::flatten::FlatScene;
-use crate::bench::frame_log::TypicalFrame;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
-use crate::measure::stats::median;
-use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
+use crate::measure::plain_time::{PlainClock, PlainTime};
+use crate::raster::Primary;
+use crate::realtime::frame_settings::Antialias;
+use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings, Technique};
 use crate::renderer::RenderSettings;
 use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
 use crate::scene::{Camera, Scene};
@@ -24,25 +27,30 @@ use crate::tracer::{Needs, Tracer};
 const MAX_PATHS: u32 = 1 << 16;
 /// Occlusion rays of a pixel in one launch at most.
 const MAX_RAYS: u32 = 256;
-/// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
-pub const TIMED_PATHS: [u32; 2] = [1, 9];
 
 /// What frames of one scene show.
 pub struct Signal {
     settings: RenderSettings,
     size: [u32; 2],
+    /// Of ambient occlusion.
+    occlusion: Option<Occlusion>,
 }
 
 impl Signal {
-    /// What the arguments ask for; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
-    pub fn new(args: &BenchFramesArgs, reach: f64, bounces: Option<u32>) -> Self {
-        let mut settings = RenderSettings { integrator: Some(args.integrator), ..RenderSettings::default() };
-        settings.image.size = Some(args.size());
+    /// What the arguments ask for, in an image of this size; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
+    pub fn new(args: &BenchFramesArgs, size: [u32; 2], reach: f64, bounces: Option<u32>) -> Result<Self> {
+        let mut settings = RenderSettings { integrator: Some(args.integrator()), ..RenderSettings::default() };
+        settings.image.size = Some(size);
         settings.integrators.path.max_depth = bounces;
-        if args.integrator.get().capabilities().contains(&Capability::AmbientOcclusion) {
+        let mut occlusion = None;
+        if args.is_occlusion() {
+            // through the middles of pixels, which all presets can
+            settings.frames.antialias = Some(Antialias::Off);
+            occlusion = Some(Occlusion::new(reach, args.ao_falloff == FalloffChoice::Binary)?);
+        } else if args.integrator().get().capabilities().contains(&Capability::AmbientOcclusion) {
             settings.integrators.ao.ao_radius = Some(Length::Units(reach));
         }
-        Self { settings, size: args.size() }
+        Ok(Self { settings, size, occlusion })
     }
 
     /// Number of values per pixel.
@@ -50,68 +58,61 @@ impl Signal {
         if is_ambient_occlusion(self.settings.integrator()) { 1 } else { 3 }
     }
 
-    fn of(&self, preset: Preset) -> RenderSettings {
+    fn render_settings(&self, preset: Preset) -> RenderSettings {
         let mut settings = self.settings.clone();
         settings.frames.preset = Some(preset);
         settings
     }
 
     /// Settings of a preset's frames, as `render` has them; all work is done in every frame.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
-    pub fn frame_settings(&self, preset: Preset) -> Result<Settings> {
-        Ok(Settings { rest: false, ..frame_settings(&self.of(preset))? })
+    pub fn frame_settings(&self, candidate: &Candidate) -> Result<Settings> {
+        self.preset_settings(candidate.preset, candidate.technique)
+    }
+
+    fn preset_settings(&self, preset: Preset, technique: Option<Technique>) -> Result<Settings> {
+        let mut render = self.render_settings(preset);
+        render.frames.technique = technique;
+        let settings = Settings { rest: false, ..frame_settings(&render)? };
+        Ok(self.occlusion.map_or(settings, |occlusion| occlusion.apply_to(settings)))
     }
 
     /// Scene data that a tracer needs for all of this.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
     pub fn needs(&self) -> Result<Needs> {
-        Ok(frame_needs(&self.settings, &self.frame_settings(Preset::Balanced)?))
+        Ok(frame_needs(&self.settings, &self.preset_settings(Preset::Balanced, None)?))
     }
 
     /// Streams that are traced.
-    ///
-    /// # Errors
-    /// Those of [`frame_settings`].
     pub fn streams(&self) -> Result<Vec<&'static StreamShaders>> {
-        Ok(frame_streams(&self.settings, &self.frame_settings(Preset::Balanced)?))
+        Ok(frame_streams(&self.settings, &self.preset_settings(Preset::Balanced, None)?))
     }
 
-    /// Makes frames of a preset, as `how` says, which is [`Signal::frame_settings`] of it or near it.
-    ///
-    /// # Errors
-    /// Those of the device.
+    /// Makes frames of a preset with these settings, which are [`Signal::frame_settings`] of it or near them.
     pub fn realtime(
         &self,
         tracer: &Tracer,
         flat: &FlatScene,
         camera: &Camera,
         preset: Preset,
-        how: Settings,
+        frame: Settings,
     ) -> Result<Realtime> {
-        let settings = self.of(preset);
-        let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
-        let options = options.map(|options| PathOptions { seed: how.seed, ..options });
-        pipeline(tracer, flat, self.size, &how, options.as_ref())
+        let settings = self.render_settings(preset);
+        let options = frame_path_options(&settings, flat.scene, camera, self.size, &frame)?;
+        let options = options.map(|options| PathOptions { seed: frame.seed, ..options });
+        pipeline(tracer, flat, self.size, &frame, options.as_ref())
     }
 
     /// Makes images of independent samples.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn sampler(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera) -> Result<Sampler> {
-        let how = self.frame_settings(Preset::Balanced)?;
-        Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &how)? {
+        let frame = self.preset_settings(Preset::Balanced, None)?;
+        Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &frame)? {
             Some(options) => {
                 let options = PathOptions { spp: MAX_PATHS, ..options };
                 Sampler::Paths { integrator: Box::new(PathIntegrator::new(tracer, flat, &options)?), options }
             }
             None => {
-                let filter = Filter { kind: FilterKind::None, ..how.filter };
-                Sampler::Rays { settings: Settings { history: 1, filter, ..how }, size: self.size }
+                let filter = Filter { kind: FilterKind::None, ..frame.filter };
+                let settings = Settings { history: 1, filter, primary: Some(Primary::Traced), ..frame };
+                Sampler::Rays { settings, size: self.size }
             }
         })
     }
@@ -145,9 +146,6 @@ impl Sampler {
     }
 
     /// Turns the environment map.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         match self {
             Self::Paths { integrator, .. } => integrator.turn_environment(to_map),
@@ -156,9 +154,6 @@ impl Sampler {
     }
 
     /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose.
-    ///
-    /// # Errors
-    /// Those of [`PathIntegrator::move_lights`].
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         match self {
             Self::Paths { integrator, .. } => integrator.move_lights(tracer, scene),
@@ -167,9 +162,6 @@ impl Sampler {
     }
 
     /// An image of `paths` samples per pixel, and the seconds that it took.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn render(&mut self, tracer: &Tracer, camera: &CameraRecord, paths: u32, seed: u32) -> Result<(Vec<f32>, f64)> {
         match self {
             Self::Paths { integrator, .. } => {
@@ -197,60 +189,8 @@ impl Sampler {
     }
 
     /// Takes the times of an image of few and one of many paths.
-    ///
-    /// # Errors
-    /// Those of [`Sampler::render`].
     pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         clock.take(|paths| Ok(self.render(tracer, camera, paths, 0)?.1))
-    }
-}
-
-/// Times of images of independent samples. They are taken between the frames that they are compared with: a machine that slows down for a while slows both down.
-#[derive(Clone, Debug, Default)]
-pub struct PlainClock {
-    seconds: [Vec<f64>; 2],
-}
-
-impl PlainClock {
-    /// Takes the times of an image of few and one of many paths. `image` renders one, and returns its seconds.
-    ///
-    /// # Errors
-    /// Those of `image`.
-    pub fn take<E>(&mut self, mut image: impl FnMut(u32) -> Result<f64, E>) -> Result<(), E> {
-        for (seconds, paths) in self.seconds.iter_mut().zip(TIMED_PATHS) {
-            seconds.push(image(paths)?);
-        }
-        Ok(())
-    }
-
-    /// By the medians of all times.
-    pub fn time(&self) -> PlainTime {
-        let ms = [0, 1].map(|k| 1e3 * median(&self.seconds[k]).unwrap_or(f64::NAN));
-        PlainTime::through(TIMED_PATHS, ms)
-    }
-}
-
-/// Time of images of independent samples, milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlainTime {
-    /// Of an image, besides its paths.
-    pub per_image: f64,
-    /// Of each path per pixel.
-    pub per_path: f64,
-}
-
-impl PlainTime {
-    /// Of images that took `ms` for so many paths: a line through two points, neither part of which is negative.
-    fn through([few, many]: [u32; 2], [least, most]: [f64; 2]) -> Self {
-        let per_path = ((most - least) / f64::from(many - few)).clamp(0.0, most / f64::from(many));
-        // times have noise: paths are not free
-        let per_path = per_path.max(0.1 * most / f64::from(many));
-        Self { per_image: (least - f64::from(few) * per_path).max(0.0), per_path }
-    }
-
-    /// As many paths as an image of so many milliseconds can have: at least one.
-    pub fn paths_in(&self, ms: f64) -> u32 {
-        (((ms - self.per_image) / self.per_path) as u32).max(1)
     }
 }
 
@@ -302,9 +242,7 @@ mod tests {
 
     #[test]
     fn paths_that_fit_a_time() {
-        let time = PlainTime::through([1, 9], [5.0, 21.0]);
-        assert_eq!(time, PlainTime { per_image: 3.0, per_path: 2.0 });
-        assert_eq!([1.0, 5.0, 10.9, 23.0].map(|ms| time.paths_in(ms)), [1, 1, 3, 10]);
+        let time = PlainTime { per_image: 3.0, per_path: 2.0 };
         let frame = TypicalFrame { ms: 10.0, paths: 8.0 };
         let equal = EqualTime::new(time, vec![frame; 10]);
         // (10 - 3) / 2 of images; 8 of frames
@@ -314,8 +252,5 @@ mod tests {
         let short = TypicalFrame { ms: 5.0, paths: 0.5 };
         let rest = EqualTime::new(time, vec![short, short, frame, frame]);
         assert_eq!([1, 2, 3, 4, 5].map(|n| rest.paths(n)), [1, 3, 9, 17, 17]);
-        // noise alone
-        let odd = PlainTime::through([1, 9], [5.0, 4.0]);
-        assert!(odd.per_path > 0.0 && odd.per_image >= 0.0);
     }
 }

@@ -3,22 +3,27 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DMat3;
+use glam::{DAffine3, DMat3};
 
-use super::FramesSession;
-use super::displayed::FrameReference;
-use super::scenes::FramesScene;
-use super::signal::{EqualTime, PlainClock, PlainTime, Sampler, Signal};
+use super::args::FramesSession;
+use super::candidates::Candidate;
+use super::frame_log::FrameLog;
+use super::scenes::{FramesScene, View};
+use super::signal::{EqualTime, Sampler, Signal};
 use crate::accel::flatten::FlatScene;
-use crate::bench::record::frames::{DenoisedImage, PlainImage};
+use crate::bench::record::{Row, plain, quantity};
 use crate::denoise::{DenoiseInput, Features, Oidn};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
+use crate::measure::displayed::{Displayed, FrameReference, ImageErrors};
+use crate::measure::plain_time::{PlainClock, PlainTime};
+use crate::raster::Primary;
 use crate::realtime::sequence::FrameSequence;
-use crate::realtime::{Preset, Realtime, Settings};
+use crate::realtime::{Preset, Realtime, Settings, Surface};
+use crate::scene::builtin::moving_box::Mover;
 use crate::scene::{Camera, Environment, EnvironmentMap, Orbit, Scene};
 use crate::terminal::interrupt::SilentControl;
-use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer};
+use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer, UpdateStats};
 
 /// Seeds of the halves of a reference; no preset has them.
 pub const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
@@ -26,8 +31,6 @@ pub const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 pub const PLAIN_SEED: u32 = 0x5eed_0100;
 /// Images of plain accumulation whose time is taken before anything else.
 pub const TIMED_IMAGES: u32 = 9;
-/// Times of plain accumulation that are taken between frames.
-const TIMES_BETWEEN: usize = 4;
 /// How far the environment map turns in a frame, degrees: as far as the camera on its orbit.
 pub const DEGREES_PER_FRAME: f64 = 0.5;
 
@@ -39,6 +42,8 @@ pub enum Motion<'a> {
     Sun(&'a EnvironmentMap),
     /// The scene's first animation plays.
     Animation(Box<FrameSequence<'a>>),
+    /// The box of the room slides to and fro.
+    Slide(Mover),
 }
 
 impl Motion<'_> {
@@ -48,7 +53,50 @@ impl Motion<'_> {
             Self::Orbit(_) => "orbit",
             Self::Sun(_) => "sun",
             Self::Animation(_) => "animation",
+            Self::Slide(_) => "slide",
         }
+    }
+
+    /// Whether objects move.
+    pub fn moves_objects(&self) -> bool {
+        matches!(self, Self::Animation(_) | Self::Slide(_))
+    }
+}
+
+/// An image of plain accumulation, in the time that a preset takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlainImage {
+    /// Paths per pixel, at least one.
+    pub paths: u32,
+    /// Its errors.
+    pub errors: ImageErrors,
+}
+
+impl PlainImage {
+    /// Adds it to the row of the preset, whose errors are `ours`.
+    pub fn add_to(&self, row: &mut Row, ours: &ImageErrors) {
+        row.exact(plain("plain paths", ""), f64::from(self.paths)).exact(quantity::PLAIN_RMSE, self.errors.rmse);
+        row.exact(quantity::PLAIN_CORRECTED, self.errors.corrected).exact(plain("plain FLIP", ""), self.errors.flip);
+        row.exact(plain("over plain", ""), ours.over(&self.errors));
+    }
+}
+
+/// Plain accumulation whose every frame is denoised, in the time that a preset takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DenoisedImage {
+    /// Paths per pixel: at least one a frame.
+    pub paths: u32,
+    /// Time of a frame: paths and denoiser. More than the preset's where the denoiser alone takes longer.
+    pub ms: f64,
+    /// Its errors.
+    pub errors: ImageErrors,
+}
+
+impl DenoisedImage {
+    /// Adds it to the row of the preset.
+    pub fn add_to(&self, row: &mut Row) {
+        row.exact(plain("oidn RMSE", ""), self.errors.rmse).exact(plain("corrected oidn RMSE", ""), self.errors.corrected);
+        row.exact(plain("oidn paths", ""), f64::from(self.paths)).exact(plain("oidn time", "ms"), self.ms);
     }
 }
 
@@ -67,13 +115,12 @@ pub struct FrameInputs {
     pub to_map: Option<DMat3>,
     /// The scene in its pose, if that moves lights.
     pub posed: Option<Arc<Scene>>,
+    /// What it took to bring the tracer up to date, where objects move.
+    pub update_seconds: Option<f64>,
 }
 
 impl FrameInputs {
     /// Changes the light of a frame to what is new in it.
-    ///
-    /// # Errors
-    /// Those of [`Realtime::move_lights`].
     pub fn light(&self, realtime: &mut Realtime, tracer: &Tracer) -> Result<()> {
         if let Some(to_map) = self.to_map {
             realtime.turn_environment(to_map);
@@ -94,6 +141,8 @@ pub struct Stage<'a> {
     pub size: [u32; 2],
     /// Seed of the samples of frames.
     pub seed: u32,
+    /// How far ambient occlusion reaches, scene units.
+    pub reach: f64,
     /// Time of plain accumulation, before anything else is measured.
     pub plain_time: PlainTime,
     signal: Signal,
@@ -102,27 +151,26 @@ pub struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Builds the tracer and finds out how long a path takes.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
+    /// Builds the tracer for images of this size, and finds out how long a path takes.
     pub fn new(
         session: &FramesSession,
-        loaded: &'a FramesScene,
+        (loaded, view): (&FramesScene, &'a View),
         flat: &'a FlatScene<'a>,
+        size: [u32; 2],
         bounces: Option<u32>,
         oidn: Option<&'a Oidn>,
     ) -> Result<Self> {
-        let (args, camera) = (session.args, &loaded.camera);
-        let signal = Signal::new(args, loaded.reach, bounces);
-        let size = args.size();
+        // the tracer
+        let (args, camera) = (session.args, &view.camera);
+        let signal = Signal::new(args, size, loaded.reach, bounces)?;
         let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(args.reference_paths());
         let build = BuildOptions { preset: args.build.preset(), rays, cache: None, streams: signal.streams()? };
         let (kind, _) = args.tracer.on(session.device.info());
         let tracer = session.device.tracer(flat, kind, signal.needs()?, ComputeOptions::default(), &build)?;
+
+        // the time of images of paths; the first ones compile
         let mut sampler = signal.sampler(&tracer, flat, camera)?;
         let record = camera_record(camera, flat, size);
-        // the first images compile
         sampler.time(&tracer, &record, &mut PlainClock::default())?;
         let mut clock = PlainClock::default();
         for _ in 0..TIMED_IMAGES {
@@ -130,7 +178,8 @@ impl<'a> Stage<'a> {
         }
         let plain_time = clock.time();
         let oidn = oidn.filter(|_| signal.channels() == 3);
-        let mut stage = Self { tracer, flat, camera, size, seed: args.seed, plain_time, signal, sampler, oidn };
+        let (reach, seed) = (loaded.reach, args.seed);
+        let mut stage = Self { tracer, flat, camera, size, seed, reach, plain_time, signal, sampler, oidn };
         // before the first update there are no vertices of before
         stage.rest()?;
         Ok(stage)
@@ -160,15 +209,13 @@ impl<'a> Stage<'a> {
     }
 
     /// Brings scene, camera and light to a frame. Frames need not come in order.
-    ///
-    /// # Errors
-    /// Those of updating the tracer.
-    pub fn go(&mut self, motion: &mut Motion, frame: u32) -> Result<FrameInputs> {
+    pub fn move_to(&mut self, motion: &mut Motion, frame: u32) -> Result<FrameInputs> {
         let camera = self.still_camera();
-        if !matches!(motion, Motion::Animation(_)) {
+        if !motion.moves_objects() {
             self.rest()?;
         }
-        let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map, posed: None };
+        let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map, posed: None, update_seconds: None };
+        let seconds = |update: &UpdateStats| Some(update.mesh_seconds + update.top_seconds);
         Ok(match motion {
             Motion::Orbit(orbit) => {
                 inputs(self.camera_record(&orbit.camera_at(self.camera, f64::from(frame))), Vec::new(), None)
@@ -184,15 +231,24 @@ impl<'a> Stage<'a> {
                 if let Some(posed) = &posed {
                     self.sampler.move_lights(&self.tracer, posed)?;
                 }
-                FrameInputs { posed, ..inputs(camera, update.moved, None) }
+                let update_seconds = seconds(&update);
+                FrameInputs { posed, update_seconds, ..inputs(camera, update.moved, None) }
+            }
+            Motion::Slide(mover) => {
+                let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
+                let update = self.place(mover.sliding(frame, aspect))?;
+                let update_seconds = seconds(&update);
+                FrameInputs { update_seconds, ..inputs(camera, update.moved, None) }
             }
         })
     }
 
+    /// Puts an instance somewhere.
+    pub fn place(&mut self, instance: (usize, DAffine3)) -> Result<UpdateStats> {
+        self.tracer.update(&Changes { instances: vec![instance], ..Default::default() })
+    }
+
     /// Tells a dynamic scene that it stands still in the next frame: motion vectors are those since its last update.
-    ///
-    /// # Errors
-    /// Those of [`Tracer::update`].
     pub fn rest(&mut self) -> Result<()> {
         if self.tracer.is_dynamic() {
             self.tracer.update(&Changes::default())?;
@@ -201,77 +257,84 @@ impl<'a> Stage<'a> {
     }
 
     /// Turns the environment map of plain and of converged images.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         self.sampler.turn_environment(to_map)
     }
 
+    /// Settings of a preset's frames.
+    pub fn settings(&self, candidate: &Candidate) -> Result<Settings> {
+        Ok(Settings { seed: self.seed, ..self.signal.frame_settings(candidate)? })
+    }
+
     /// Makes frames of a preset, without any history.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn realtime(&self, preset: Preset) -> Result<Realtime> {
-        self.realtime_with_seed(preset, self.seed)
+    pub fn realtime(&self, candidate: &Candidate) -> Result<Realtime> {
+        self.realtime_with(candidate, self.settings(candidate)?)
     }
 
-    /// The same with other samples.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn realtime_with_seed(&self, preset: Preset, seed: u32) -> Result<Realtime> {
-        let how = Settings { seed, ..self.signal.frame_settings(preset)? };
-        self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
+    /// The same with other settings.
+    pub fn realtime_with(&self, candidate: &Candidate, settings: Settings) -> Result<Realtime> {
+        self.signal.realtime(&self.tracer, self.flat, self.camera, candidate.preset, settings)
     }
 
-    /// As [`Stage::realtime`], but frames at rest take as many paths as those in motion.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn realtime_as_in_motion(&self, preset: Preset) -> Result<Realtime> {
-        let how = Settings { seed: self.seed, converge: false, ..self.signal.frame_settings(preset)? };
-        self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
+    /// The last of some frames, every one with all of its camera rays: the camera moves by less than a thousandth of a pixel.
+    pub fn jittered_frames(&self, candidate: &Candidate, settings: Settings, frames: u32) -> Result<(Vec<f32>, FrameLog)> {
+        let mut realtime = self.realtime_with(candidate, settings)?;
+        let (mut log, camera) = (FrameLog::default(), self.still_camera());
+        for frame in 0..frames {
+            log.render_frame(&mut realtime, &self.tracer, &jittered(&camera, frame), &[])?;
+        }
+        Ok((realtime.result()?, log))
     }
 
-    /// Paths, or rays, of a pixel in a frame of a preset.
-    ///
-    /// # Errors
-    /// Those of settings.
-    pub fn rays_per_pixel(&self, preset: Preset) -> Result<u32> {
-        Ok(self.signal.frame_settings(preset)?.rays_per_pixel)
+    /// What each pixel shows.
+    pub fn surfaces(&self, camera: &CameraRecord) -> Result<Vec<Option<Surface>>> {
+        let settings = Settings { primary: Some(Primary::Traced), ..Preset::Fast.settings() };
+        let mut realtime = Realtime::new(&self.tracer, self.size, &settings, &[])?;
+        realtime.frame(&self.tracer, camera, &[])?;
+        realtime.surfaces()
+    }
+
+    /// What frames show of a scene that does not change, in each of so many from now on, without any past.
+    pub fn frames_afresh(&self, realtime: &mut Realtime, camera: &CameraRecord, frames: u32) -> Result<Vec<Vec<f32>>> {
+        realtime.reset();
+        let mut log = FrameLog::default();
+        let mut render_one = |_| {
+            log.render_frame(realtime, &self.tracer, camera, &[])?;
+            realtime.result()
+        };
+        (0..frames).map(&mut render_one).collect()
+    }
+
+    /// An image as it is displayed.
+    pub fn displayed(&self, image: &[f32]) -> Displayed {
+        Displayed::new(image, self.channels())
     }
 
     /// A converged image of what the scene is now.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn reference(&mut self, camera: &CameraRecord, paths: u32) -> Result<FrameReference> {
         let mut half = |seed| Ok::<_, crate::Error>(self.sampler.render(&self.tracer, camera, paths.div_ceil(2), seed)?.0);
         let [a, b] = REFERENCE_SEEDS.map(&mut half);
-        FrameReference::new([&a?, &b?], self.channels(), self.size[0] as usize)
+        // of ambient visibility only pixels count that show something
+        let mask = if self.channels() == 1 {
+            let surfaces = self.surfaces(camera)?;
+            Some(surfaces.iter().map(|s| f32::from(u8::from(s.is_some()))).collect())
+        } else {
+            None
+        };
+        FrameReference::new([&a?, &b?], self.channels(), self.size[0] as usize, mask)
     }
 
     /// Plain accumulation of so many paths.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn plain(&mut self, camera: &CameraRecord, paths: u32, seed: u32) -> Result<Vec<f32>> {
         Ok(self.sampler.render(&self.tracer, camera, paths, seed)?.0)
     }
 
     /// Takes the time of plain accumulation.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn time_plain(&mut self, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         self.sampler.time(&self.tracer, camera, clock)
     }
 
     /// Plain accumulation of so many paths, and its errors.
-    ///
-    /// # Errors
-    /// Those of the device; Ctrl-C.
     pub fn plain_image(
         &mut self,
         camera: &CameraRecord,
@@ -284,9 +347,6 @@ impl<'a> Stage<'a> {
 
     /// Plain accumulation over `frames` frames in the time of a preset's, every one of them denoised, and the errors of the last. Feature images count where the camera
     /// moves (`is_moving`): of one that stands still they are rendered once. `None` where Open Image Denoise is not there.
-    ///
-    /// # Errors
-    /// Those of the device and the library; Ctrl-C.
     pub fn denoised(
         &mut self,
         camera: &CameraRecord,
@@ -316,10 +376,10 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Is the time of plain accumulation taken after a frame, counted from 0, of so many whose time counts from `first` on?
-pub fn is_plain_timed(frame: u32, first: usize, frames: u32) -> bool {
-    let step = (frames as usize - first).div_ceil(TIMES_BETWEEN);
-    (frame as usize).checked_sub(first).is_some_and(|n| n.is_multiple_of(step.max(1)))
+/// The camera, but for less than a thousandth of a pixel in every second frame: enough that everything has to be looked at anew.
+fn jittered(camera: &CameraRecord, frame: u32) -> CameraRecord {
+    let [width, height] = camera.view;
+    CameraRecord { view: [if frame % 2 == 1 { width.next_up() } else { width }, height], ..*camera }
 }
 
 fn camera_record(camera: &Camera, flat: &FlatScene, size: [u32; 2]) -> CameraRecord {
@@ -331,10 +391,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plain_accumulation_is_timed_between_late_frames() {
-        let at = |frames: u32, first: usize| (0..frames).filter(|f| is_plain_timed(*f, first, frames)).collect::<Vec<_>>();
-        assert_eq!(at(96, 48), [48, 60, 72, 84]);
-        assert_eq!(at(8, 0), [0, 2, 4, 6]);
-        assert_eq!(at(4, 2), [2, 3]);
+    fn a_jittered_camera_moves_by_next_to_nothing() {
+        let camera =
+            CameraRecord { camera_to_world: [[0.0; 4]; 3], view: [0.7, 0.4], orthographic: false, clip: [0.0, f32::INFINITY] };
+        let moved = jittered(&camera, 1);
+        assert!(moved != camera && jittered(&camera, 2) == camera);
+        // pixels, at the border of a wide image
+        assert!((moved.view[0] - camera.view[0]) / camera.view[0] * 3840.0 < 1e-3);
     }
 }

@@ -1,18 +1,19 @@
-//! A scene: every preset standing still, moving, and after changes.
+//! A scene from one or several views: every preset standing still, moving, and after changes.
 
-use super::args::Part;
-use super::scenes::{self, FramesScene};
+use super::args::{FramesSession, Part};
+use super::frame_log::FRAMES_PER_TURN;
+use super::scenes::{self, FramesScene, View};
 use super::stage::{Motion, Stage};
-use super::{FramesSession, change, moving, peers, still, table};
+use super::{change, larsen, moving, peers, still};
 use crate::accel::flatten::FlatScene;
-use crate::bench::frame_log::FRAMES_PER_TURN;
-use crate::bench::record::frames::FramesView;
+use crate::bench::record::{REFERENCE, plain, quantity};
 use crate::denoise::Oidn;
 use crate::error::Result;
 use crate::realtime::sequence::{CameraMotion, FrameSequence};
-use crate::scene::{AnimationRig, Orbit};
+use crate::report::thousands;
+use crate::scene::{self, AnimationRig, Orbit};
 
-/// Of an animation.
+/// Frames a second of an animation.
 const FRAMES_PER_SECOND: f64 = 60.0;
 
 /// Open Image Denoise, where it is there; a note says why not.
@@ -27,10 +28,8 @@ pub fn open_denoiser(session: &mut FramesSession) -> Option<Oidn> {
 }
 
 /// Measures a scene.
-///
-/// # Errors
-/// Those of loading the scene and of the device; Ctrl-C.
 pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -> Result<()> {
+    // the scene, with all that may move in it
     let args = session.args;
     session.phase(format!("{source}: loading"));
     let loaded = scenes::load(source, args)?;
@@ -38,76 +37,124 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
     let scene = &loaded.scene;
     let has_animation = scene.rig.as_ref().is_some_and(|rig: &AnimationRig| !rig.animations().is_empty());
     let animation = (has_animation && args.wants(Part::Animation)).then_some(0);
-    let camera = loaded.camera.clone();
-    let sequence = FrameSequence::new(scene, camera, None, CameraMotion::Still, animation, FRAMES_PER_SECOND)?;
-    let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, args.integrator.get().blend())?;
-    session.phase(format!("{}: building", loaded.name));
-    let mut stage = Stage::new(session, &loaded, &flat, None, oidn)?;
-    let mut record = FramesView {
-        scene: loaded.name.clone(),
-        primitives: scene.triangle_count() + scene.sphere_count(),
-        light: loaded.light.clone(),
-        ms_per_path: stage.plain_time.per_path,
-        ms_per_image: stage.plain_time.per_image,
-        ..FramesView::default()
+    let sequence =
+        |view: &View| FrameSequence::new(scene, view.camera.clone(), None, CameraMotion::Still, animation, FRAMES_PER_SECOND);
+    let motion = match loaded.mover {
+        Some(mover) => scene::Motion { instances: vec![mover.instance], meshes: Vec::new() },
+        None => loaded.views.first().map(sequence).transpose()?.map_or(Ok(scene::Motion::default()), |s| s.motion())?,
     };
-    let outcome = fill(session, &loaded, &mut stage, animation.map(|_| sequence), &mut record);
-    // what there is, also where it failed
-    if !(record.still.is_empty() && record.motions.is_empty() && record.changes.is_empty()) {
-        session.show(&table::view(&record))?;
-        session.record.views.push(record);
+    let flat = FlatScene::with_motion_and_blend(scene, motion, args.integrator().get().blend())?;
+
+    for (k, view) in loaded.views.iter().enumerate() {
+        if session.is_over() {
+            session.leave_out(&view.name);
+            continue;
+        }
+        session.phase(format!("{}: building", view.name));
+        let mut stage = Stage::new(session, (&loaded, view), &flat, args.size(), None, oidn)?;
+        let sequence = animation.map(|_| sequence(view)).transpose()?;
+        let views = loaded.views.len() as f64;
+        let outcome = fill(session, (&loaded, view), &mut stage, sequence, [k, k + 1].map(|k| k as f64 / views));
+        // what there is, also where it failed
+        describe(session, &loaded, view, &stage);
+        session.show_scene(&view.name)?;
+        outcome?;
     }
-    outcome
+    Ok(())
+}
+
+/// Says what a view is of, if anything was measured of it.
+fn describe(session: &mut FramesSession, loaded: &FramesScene, view: &View, stage: &Stage) {
+    if !session.record.measurements.iter().any(|m| m.scene == view.name) {
+        return;
+    }
+    let (primitives, light) = (thousands(loaded.primitives()), &loaded.light);
+    let (image, path) = (stage.plain_time.per_image, stage.plain_time.per_path);
+    let reach = if stage.channels() == 1 { format!(", occlusion reaches {:.4}", loaded.reach) } else { String::new() };
+    session.record.scene(&view.name).about = format!(
+        "{primitives} primitives, light {light}{reach}; plain accumulation takes {image:.2} ms an image and {path:.2} ms a path"
+    );
 }
 
 fn fill<'a>(
     session: &mut FramesSession,
-    loaded: &'a FramesScene,
+    (loaded, view): (&'a FramesScene, &'a View),
     stage: &mut Stage<'a>,
     sequence: Option<FrameSequence<'a>>,
-    record: &mut FramesView,
+    [from, to]: [f64; 2],
 ) -> Result<()> {
+    // what moves; the still camera, each motion and the changes are steps
     let args = session.args;
     let mut motions = Vec::new();
     if args.wants(Part::Moving) {
-        motions.push(Motion::Orbit(Orbit::vertical(loaded.middle, FRAMES_PER_TURN)?));
+        motions.push(Motion::Orbit(Orbit::vertical(view.middle, FRAMES_PER_TURN)?));
     }
     motions.extend(stage.map().filter(|_| args.wants(Part::Sun)).map(Motion::Sun));
     motions.extend(sequence.map(|s| Motion::Animation(Box::new(s))));
-    // the still camera, each motion, the changes
+    motions.extend(loaded.mover.filter(|_| args.wants(Part::Animation)).map(Motion::Slide));
     let steps = motions.len() as f64 + 2.0;
-    if args.wants(Part::Still) {
-        session.phase(format!("{}: reference", loaded.name));
-        let reference = stage.reference(&stage.still_camera(), args.reference_paths())?;
-        record.reference_rmse = reference.rmse;
-        let mut beside = peers::prepare(session, loaded)?;
-        for preset in args.presets() {
-            if session.is_late() && !record.still.is_empty() {
-                session.leave_out(&format!("{}, still: {preset}", loaded.name));
-                continue;
-            }
-            session.phase(format!("{}, still: {preset}", loaded.name));
-            record.still.push(still::measure(session, stage, preset, &reference, &mut beside)?);
-        }
+    let share = |step: f64| from + (to - from) * step / steps;
+
+    if args.wants_still() || args.wants(Part::Rest) {
+        measure_still(session, (loaded, view), stage)?;
     }
-    let is_late = |session: &mut FramesSession, record: &FramesView, what: &str| {
-        let late = session.is_late() && !(record.still.is_empty() && record.motions.is_empty());
-        if late {
-            session.leave_out(&format!("{}, {what}", loaded.name));
-        }
-        late
-    };
     for (k, motion) in motions.into_iter().enumerate() {
-        session.advance((k as f64 + 1.0) / steps);
-        if !is_late(session, record, motion.name()) {
-            record.motions.push(moving::measure(session, &loaded.name, stage, motion)?);
+        session.advance(share(k as f64 + 1.0));
+        if session.is_over() {
+            session.leave_out(&format!("{}, {}", view.name, motion.name()));
+            continue;
         }
+        moving::measure(session, &view.name, stage, motion)?;
     }
     if args.wants(Part::Change) {
-        session.advance((steps - 1.0) / steps);
-        if !is_late(session, record, "changes") {
-            record.changes = change::measure(session, loaded, stage)?;
+        session.advance(share(steps - 1.0));
+        if session.is_over() {
+            session.leave_out(&format!("{}, changes", view.name));
+        } else {
+            change::measure(session, view, stage, loaded.mover)?;
         }
+    }
+    Ok(())
+}
+
+/// Everything about a camera that stands still.
+fn measure_still(session: &mut FramesSession, (loaded, view): (&FramesScene, &View), stage: &mut Stage) -> Result<()> {
+    // the reference
+    let (args, scene) = (session.args, view.name.as_str());
+    session.phase(format!("{scene}: reference"));
+    let reference = stage.reference(&stage.still_camera(), args.reference_paths())?;
+    let covered = reference.mask.as_ref().map(|mask| mask.iter().filter(|m| **m > 0.0).count() as f64);
+    if covered == Some(0.0) {
+        session.note(format!("{scene}: nothing is in view"));
+        return Ok(());
+    }
+
+    // each preset, at rest as well
+    let mut beside = peers::prepare(session, loaded, view)?;
+    let mut results = Vec::new();
+    for candidate in args.candidates() {
+        if session.is_over() {
+            session.leave_out(&format!("{scene}, still: {}", candidate.name));
+            continue;
+        }
+        session.phase(format!("{scene}, still: {}", candidate.name));
+        if args.wants_still() {
+            results.push(still::measure(session, scene, stage, candidate, &reference, &mut beside)?);
+        }
+        if args.wants(Part::Rest) {
+            still::measure_rest(session, scene, stage, candidate, &reference)?;
+        }
+    }
+    let mut row = session.record.row(scene, still::PART, REFERENCE);
+    row.exact(quantity::RMSE.not_compared(), reference.rmse).exact(plain("pixels", ""), covered);
+
+    // beside Larsen's pipeline
+    let said = larsen::remarks(&results);
+    session.record.scene(scene).remarks.extend(said);
+    if args.wants(Part::EqualTime) && !session.is_late() {
+        session.phase(format!("{scene}: equal time"));
+        let record = &mut session.record;
+        larsen::measure_equal_time(record, scene, stage, &results, &reference, args.frames())?;
     }
     Ok(())
 }

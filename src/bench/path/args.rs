@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 
 use crate::bench::common::CommonArgs;
+use crate::bench::session::Session;
 use crate::integrators::path::Strategy;
 use crate::output::parse_size;
 use crate::settings::parse::parse_seconds;
@@ -69,6 +70,9 @@ pub struct BenchPathArgs {
     #[command(flatten)]
     pub common: CommonArgs,
 }
+
+/// A run of `skylit bench path`.
+pub type PathSession<'a> = Session<'a, BenchPathArgs>;
 
 impl BenchPathArgs {
     /// Image size, pixels.

@@ -1,11 +1,11 @@
 //! Contestants, and what was measured of them until now.
 
+use super::curve::{ErrorCurve, ErrorPoint};
 use super::engine::{Engine, PathReference};
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::record::path::{ContestantRecord, ErrorPoint, SceneRecord};
-use crate::bench::record::without_reference;
+use crate::measure::displayed::without_reference;
 use crate::measure::metrics::{ImagePair, bad_pixels};
-use crate::measure::stats::Summary;
+use crate::measure::stats::median;
 
 /// A sampling strategy of our own or a kernel of a peer, with a scene.
 pub struct Contestant<'a> {
@@ -40,9 +40,6 @@ impl<'a> Contestant<'a> {
     }
 
     /// Renders an image and measures it. Those of the warming round are held against the reference, too: their seeds are their own.
-    ///
-    /// # Errors
-    /// Those of [`Engine::render`].
     pub fn render(&mut self, peers: &mut [Peer], round: u32, spp: u32, references: &[PathReference]) -> Result<(), PeerError> {
         let image = self.engine.render(peers, spp, 1 + round)?;
         let reference = &references[self.reference];
@@ -73,7 +70,7 @@ impl<'a> Contestant<'a> {
     }
 
     /// What was found.
-    pub fn finish(self, size: [u32; 2], record: &SceneRecord, references: &[PathReference]) -> ContestantRecord {
+    pub fn finish(self, size: [u32; 2], references: &[PathReference]) -> ErrorCurve {
         let reference_mse = references[self.reference].rmse.powi(2);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let points: Vec<ErrorPoint> = self
@@ -81,39 +78,35 @@ impl<'a> Contestant<'a> {
             .iter()
             .map(|l| {
                 let squares = mean(&l.squares);
-                let unsure = squares < 4.0 * reference_mse;
+                let is_unsure = squares < 4.0 * reference_mse;
                 let reference_rmse = references[self.reference].rmse;
                 let error =
-                    |squares: f64| if unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) };
+                    |squares: f64| if is_unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) };
                 ErrorPoint {
                     spp: l.spp,
-                    seconds: Summary::of(&l.seconds),
-                    repeats: l.seconds.clone(),
+                    seconds: l.seconds.clone(),
                     rmse: error(squares),
                     rmse_repeats: l.squares.iter().map(|s| error(*s)).collect(),
-                    unsure,
+                    is_unsure,
                     bad_pixels: mean(&l.bad),
                 }
             })
             .collect();
         let paths = |l: &SampleCount| f64::from(l.spp) * f64::from(size[0]) * f64::from(size[1]);
         let last = self.by_spp.last().zip(points.last());
-        let seconds = last.and_then(|(_, p)| p.seconds).map_or(f64::NAN, |s| s.median);
+        let seconds = last.and_then(|(_, p)| median(&p.seconds)).unwrap_or(f64::NAN);
         // how far the mean of all images is off, by how far the rounds are from one another
         let n = self.biases.len() as f64;
         let middle = mean(&self.biases);
         let spread = (self.biases.iter().map(|b| (b - middle).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
-        let engine = record.references.get(self.reference).map_or_else(String::new, |r| r.engine.clone());
-        ContestantRecord {
+        ErrorCurve {
             name: self.name,
-            engine,
+            is_peers: matches!(self.engine, Engine::Peer { .. }),
             bias_sigmas: (self.biases.len() > 2 && spread > 0.0).then(|| middle / spread),
             mpaths: last.map_or(0.0, |(l, _)| paths(l) / seconds / 1e6),
             mrays: last.and_then(|(l, _)| Some(l.rays? as f64 / seconds / 1e6)),
-            efficiency: last.map_or(0.0, |(_, p)| 1.0 / (p.rmse * p.rmse * seconds)),
             longest_launch: self.longest_launch,
             points,
-            seconds_to_target: None,
         }
     }
 }

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use crate::accel::flatten::FlatScene;
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
+use crate::measure::halves::ReferenceHalves;
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::Tracer;
 
@@ -56,18 +56,12 @@ pub enum Engine<'a> {
 
 impl<'a> Engine<'a> {
     /// One of our own.
-    ///
-    /// # Errors
-    /// Those of the device.
     pub fn own(tracer: &'a Tracer, flat: &FlatScene, camera: CameraRecord, options: &PathOptions) -> Result<Self> {
         let integrator = Box::new(PathIntegrator::new(tracer, flat, options)?);
         Ok(Self::Own { tracer, camera, integrator })
     }
 
     /// An image.
-    ///
-    /// # Errors
-    /// Those of the device or the peer; Ctrl-C.
     pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<TimedImage, PeerError> {
         match self {
             Self::Own { tracer, camera, integrator } => {
@@ -89,6 +83,8 @@ impl<'a> Engine<'a> {
 
 /// A reference image.
 pub struct PathReference {
+    /// Who rendered it: skylit, or the name of a peer.
+    pub engine: String,
     /// Linear RGB, rows from the top.
     pub image: Vec<f32>,
     /// Standard error of `image`, root mean square over pixels and channels.
@@ -99,15 +95,12 @@ pub struct PathReference {
     pub seconds: f64,
 }
 
-/// Renders a reference for `limit` seconds. `advance` hears the share that is done.
-///
-/// # Errors
-/// Those of [`Engine::render`].
+/// Renders the reference of an engine of this name for `limit` seconds. `advance` hears the share that is done.
 pub fn render_reference(
     engine: &mut Engine,
+    name: &str,
     peers: &mut [Peer],
-    limit: f64,
-    max_spp: u32,
+    (limit, max_spp): (f64, u32),
     advance: &mut dyn FnMut(f64),
 ) -> Result<PathReference, PeerError> {
     // how many paths take about a chunk's time
@@ -129,5 +122,6 @@ pub fn render_reference(
         advance((seconds / limit).min(1.0));
     }
     let rmse = halves.standard_error(3, None)?;
-    Ok(PathReference { image: halves.mean(), rmse, spp: u64::from(spp) * u64::from(chunks), seconds })
+    let spp = u64::from(spp) * u64::from(chunks);
+    Ok(PathReference { engine: name.to_owned(), image: halves.mean(), rmse, spp, seconds })
 }

@@ -3,26 +3,29 @@
 
 mod args;
 mod contestant;
+mod curve;
 mod engine;
 mod peer;
 mod scenes;
-pub mod table;
 
 pub use args::BenchPathArgs;
+use args::PathSession;
 use contestant::Contestant;
+use curve::{ErrorCurve, PART};
 use engine::{Engine, PathReference, STEP, render_reference};
 use scenes::PathScene;
 
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::record::path::{OWN, PathBenchmark, ReferenceDifference, ReferenceRecord, SceneRecord};
+use super::record::{BenchKind, REFERENCE, Record, plain, quantity};
+use super::scenes::table_name;
 use super::session::Session;
-use super::table::Block;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{self, PathOptions};
 use crate::measure::metrics::ImagePair;
+use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs};
@@ -32,24 +35,25 @@ const MAX_SPP: u32 = 1 << 16;
 /// Share of a scene's progress that its references get.
 const REFERENCES: f64 = 0.4;
 
-/// A run of `skylit bench path`.
-type PathSession<'a> = Session<'a, BenchPathArgs, PathBenchmark>;
+/// Name of our own engine.
+const OWN: &str = "skylit";
 
 /// Measures, shows, writes.
-///
-/// # Errors
-/// The first that went wrong; what was measured is written all the same.
 pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(args);
     // before anything that takes long
     let specs = file::choose(args.peers.as_deref(), Measures::Paths)?;
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
     args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| PathBenchmark {
+    let mut session = Session::start(args, &args.common, |device| Record {
+        benchmark: BenchKind::Path,
         host: device.host_info(),
-        tracer: args.tracer.on(device.info()).0.name().to_owned(),
-        repeats: args.repeats(),
-        ..Default::default()
+        settings: [
+            ("tracer".to_owned(), args.tracer.on(device.info()).0.name().to_owned()),
+            ("size".to_owned(), format!("{}x{}", args.size()[0], args.size()[1])),
+        ]
+        .into(),
+        ..Record::default()
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
@@ -60,8 +64,7 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
 fn measure(session: &mut PathSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
     session.start_peers(specs)?;
     session.record.peers = session.peer_titles();
-    let title = table::title(&session.record);
-    session.show(&[Block::Line(title)])?;
+    session.show_title()?;
     session.expect_jobs(scenes.len());
     scenes.iter().try_for_each(|source| session.job(source, |session| session.scene(source)))
 }
@@ -69,7 +72,7 @@ fn measure(session: &mut PathSession, scenes: &[String], specs: Result<Vec<PeerS
 impl PathSession<'_> {
     fn scene(&mut self, source: &str) -> Result<()> {
         let (args, size) = (self.args, self.args.size());
-        let name = scenes::name(source);
+        let name = table_name(&scenes::FILES, source);
         self.phase(format!("{name}: building"));
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let loaded = scenes::load(source, args, aspect)?;
@@ -81,23 +84,13 @@ impl PathSession<'_> {
         let needs = Needs { shading: true, ..Default::default() };
         let (kind, _) = args.tracer.on(self.device.info());
         let tracer = self.device.tracer(&flat, kind, needs, ComputeOptions::default(), &build)?;
-        let mut record = SceneRecord {
-            scene: name.clone(),
-            size,
-            triangles: loaded.scene.triangle_count(),
-            spheres: loaded.scene.sphere_count(),
-            environment: loaded.environment.clone(),
-            ..SceneRecord::default()
-        };
         let own = |strategy| -> Result<Engine> {
             let options = PathOptions { size, spp: MAX_SPP, strategy, ..PathOptions::default() };
             Engine::own(&tracer, &flat, camera, &options)
         };
         let mut engine = own(path::Strategy::Mis)?;
-        let mut references = vec![self.reference(&mut record, OWN, &mut engine).map_err(|e| e.of(OWN))?];
-        if let Engine::Own { integrator, .. } = &engine {
-            record.lights = integrator.lights();
-        }
+        let mut references = vec![self.reference(&name, OWN, 0, &mut engine).map_err(|e| e.into_error(OWN))?];
+        let lights = if let Engine::Own { integrator, .. } = &engine { integrator.lights() } else { 0 };
         drop(engine);
         let mut contestants: Vec<Contestant> = Vec::new();
         for strategy in args.strategies() {
@@ -105,7 +98,7 @@ impl PathSession<'_> {
         }
         let mut baseline = contestants.first().map(|c| c.name.clone());
         for k in 0..self.peers.len() {
-            match self.peer_contestants(k, &loaded, &mut record, &mut references) {
+            match self.peer_contestants(k, (&name, &loaded), size, &mut references) {
                 Ok(theirs) => {
                     if let (0, Some(first)) = (k, theirs.first()) {
                         baseline = Some(first.name.clone());
@@ -120,12 +113,42 @@ impl PathSession<'_> {
             }
         }
         self.rounds(&name, &mut contestants, &references)?;
-        record.results = contestants.into_iter().map(|c| c.finish(size, &record, &references)).collect();
-        if let Some(baseline) = baseline {
-            record.set_target(&baseline);
+        let curves: Vec<ErrorCurve> = contestants.into_iter().map(|c| c.finish(size, &references)).collect();
+
+        // all at once: what is interrupted on the way is no result
+        let mut about = vec![format!("{} triangles", thousands(loaded.scene.triangle_count()))];
+        let spheres = loaded.scene.sphere_count();
+        about.extend((spheres > 0).then(|| format!("{} spheres", thousands(spheres))));
+        about.push(format!("{lights} lights"));
+        about.push(format!("environment {}", loaded.environment));
+        self.record.scene(&name).about = about.join(", ");
+        self.add_references(&name, &references)?;
+        let target = baseline.and_then(|baseline| curves.iter().find(|c| c.name == baseline));
+        curves.iter().for_each(|curve| curve.add_to(&mut self.record, &name, target));
+        if let Some((target, last)) = target.and_then(|t| Some((t, t.points.last()?))) {
+            let remark = format!("the target is the RMSE of the longest images of {}: {:.2e}", target.name, last.rmse);
+            self.record.scene(&name).remarks.push(remark);
         }
-        self.show(&table::scene(&record))?;
-        self.record.scenes.push(record);
+        self.show_scene(&name)
+    }
+
+    /// Adds what reference images are, and how far those of peers are from ours.
+    fn add_references(&mut self, scene: &str, references: &[PathReference]) -> Result<()> {
+        let mean = |r: &PathReference| r.image.iter().map(|v| f64::from(*v)).sum::<f64>() / r.image.len() as f64;
+        for r in references {
+            let name = if references.len() > 1 { format!("{REFERENCE} of {}", r.engine) } else { REFERENCE.to_owned() };
+            let mut row = self.record.row(scene, PART, &name).of_peer(r.engine != OWN);
+            row.exact(quantity::RMSE.not_compared(), r.rmse).exact(plain("greatest", "spp"), r.spp as f64);
+            row.exact(plain("image", "s"), r.seconds).exact(plain("mean", ""), mean(r));
+            let ours = &references[0];
+            if r.engine != OWN {
+                let rmse = ImagePair::new(&r.image, &ours.image, 3, None)?.rmse();
+                let explained = r.rmse.hypot(ours.rmse);
+                let ratio = mean(r) / mean(ours);
+                row.exact(plain("mean over ours", ""), ratio).exact(plain("RMSE beside ours", ""), rmse);
+                row.exact(plain("of which noise", ""), explained);
+            }
+        }
         Ok(())
     }
 
@@ -133,42 +156,29 @@ impl PathSession<'_> {
     fn peer_contestants(
         &mut self,
         k: usize,
-        loaded: &PathScene,
-        record: &mut SceneRecord,
+        (name, loaded): (&str, &PathScene),
+        size: [u32; 2],
         references: &mut Vec<PathReference>,
     ) -> Result<Vec<Contestant<'static>>, PeerError> {
-        let size = record.size;
         self.peers[k].load_scene(&loaded.scene, &loaded.camera, size)?;
         let spec = self.peers[k].spec.clone();
         let engine = |kernel: &String| Engine::Peer { peer: k, kernel: kernel.clone(), size };
         let Some(first) = spec.kernels.first() else { return Ok(Vec::new()) };
-        let theirs = self.reference(record, &spec.name, &mut engine(first))?;
-        let ours = &references[0];
-        let sum = |r: &PathReference| r.image.iter().map(|v| f64::from(*v)).sum::<f64>();
-        record.differences.push(ReferenceDifference {
-            engine: spec.name.clone(),
-            mean_ratio: sum(&theirs) / sum(ours),
-            rmse: ImagePair::new(&theirs.image, &ours.image, 3, None)?.rmse(),
-            explained: theirs.rmse.hypot(ours.rmse),
-        });
+        let theirs = self.reference(name, &spec.name, references.len(), &mut engine(first))?;
         references.push(theirs);
         let reference = references.len() - 1;
         Ok(spec.kernels.iter().map(|k| Contestant::new(spec.title_of(k), reference, engine(k))).collect())
     }
 
-    /// Renders the reference of an engine.
-    fn reference(&mut self, record: &mut SceneRecord, name: &str, engine: &mut Engine) -> Result<PathReference, PeerError> {
-        self.phase(format!("{}: reference of {name}", record.scene));
+    /// Renders the reference of an engine, after so many others.
+    fn reference(&mut self, scene: &str, name: &str, done: usize, engine: &mut Engine) -> Result<PathReference, PeerError> {
+        self.phase(format!("{scene}: reference of {name}"));
         let limit = self.args.reference_seconds();
         // ours, and one of each peer
-        let (before, all) = (record.references.len() as f64, (self.peers.len() + 1) as f64);
+        let (done, all) = (done as f64, (self.peers.len() + 1) as f64);
         let (mut advance, peers) = self.advancer();
-        let reference =
-            render_reference(engine, peers, limit, MAX_SPP, &mut |share| advance(REFERENCES * (before + share) / all))?;
-        let mean = reference.image.iter().map(|v| f64::from(*v)).sum::<f64>() / reference.image.len() as f64;
-        let PathReference { spp, seconds, rmse, .. } = reference;
-        record.references.push(ReferenceRecord { engine: name.to_owned(), spp, seconds, rmse, mean });
-        Ok(reference)
+        let mut advance = |share| advance(REFERENCES * (done + share) / all);
+        render_reference(engine, name, peers, (limit, MAX_SPP), &mut advance)
     }
 
     /// Everybody in turn, sample count by sample count: a warming round, which also finds how far to go, then the timed ones.
@@ -195,7 +205,7 @@ impl PathSession<'_> {
                         continue;
                     }
                     going = true;
-                    contestant.render(&mut self.peers, round, spp, references).map_err(|e| e.of(&contestant.name))?;
+                    contestant.render(&mut self.peers, round, spp, references).map_err(|e| e.into_error(&contestant.name))?;
                 }
                 spp *= STEP;
             }

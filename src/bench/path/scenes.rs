@@ -1,11 +1,9 @@
 //! Which scenes are measured, what lights them, and from where they are seen.
 
-use std::path::Path;
-
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::args::BenchPathArgs;
-use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WellKnownScene, check_exists, sun_map};
+use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WellKnownScene, check_exists, environment_text, sun_map};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
@@ -14,7 +12,7 @@ use crate::scene::material::MaterialKind;
 use crate::scene::{Camera, Environment, Instance, Material, Mesh, Scene, load};
 
 /// Well-known scenes that are measured.
-const FILES: [&WellKnownScene; 2] = [&FLIGHT_HELMET, &SPONZA];
+pub const FILES: [&WellKnownScene; 2] = [&FLIGHT_HELMET, &SPONZA];
 
 /// A sphere under the sun map.
 struct Ball {
@@ -66,9 +64,6 @@ pub struct PathScene {
 }
 
 /// Loads a scene, lights it where it is dark, and chooses its view.
-///
-/// # Errors
-/// Those of loading the scene or the environment.
 pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene> {
     let mut scene = match BALLS.iter().find(|b| b.name == source) {
         Some(ball) => ball_scene(ball),
@@ -92,11 +87,7 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene
     }
     let choice = known.and_then(|k| k.view).map_or(Choice::Auto, |view| view.choice());
     let camera = camera::choose(&scene, &choice, aspect)?;
-    let environment = match &scene.environment {
-        Environment::Black => "black".to_owned(),
-        Environment::Uniform(c) => format!("{},{},{}", c.x, c.y, c.z),
-        Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
-    };
+    let environment = environment_text(&scene.environment, "black");
     Ok(PathScene { scene, camera, environment })
 }
 
@@ -118,13 +109,6 @@ fn ball_scene(ball: &Ball) -> Scene {
         cameras: vec![Camera::look_at(DVec3::new(0.0, 0.6, 3.2), DVec3::ZERO, DVec3::Y, 45f64.to_radians())],
         ..Scene::default()
     }
-}
-
-/// In tables.
-pub fn name(source: &str) -> String {
-    let path = Path::new(source);
-    let named = WellKnownScene::find(&FILES, source).and_then(|_| path.file_stem());
-    named.map_or_else(|| source.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

@@ -71,9 +71,6 @@ pub struct PeerSpec {
 }
 
 /// The peers of a benchmark, from the requested file (`none`: no peers) or from [`DEFAULT`]; or the reason why there are none.
-///
-/// # Errors
-/// Those of [`read`].
 pub fn choose(requested: Option<&str>, measures: Measures) -> Result<Result<Vec<PeerSpec>, String>> {
     let file = match requested {
         Some("none") => return Ok(Ok(Vec::new())),

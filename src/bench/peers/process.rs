@@ -35,7 +35,7 @@ impl From<Error> for PeerError {
 
 impl PeerError {
     /// As an error that ends what `who` was part of.
-    pub fn of(self, who: &str) -> Error {
+    pub fn into_error(self, who: &str) -> Error {
         match self {
             Self::Failed(why) => Error::CheckFailed(format!("{who}: {why}")),
             Self::Ours(e) => e,

@@ -5,6 +5,7 @@ use clap::{Args, ValueHint};
 use super::contestant::KERNELS;
 use super::streams::STREAMS;
 use crate::bench::common::CommonArgs;
+use crate::bench::session::Session;
 use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::BuildChoice;
@@ -66,6 +67,9 @@ pub struct BenchRaysArgs {
     #[command(flatten)]
     pub common: CommonArgs,
 }
+
+/// A run of `skylit bench rays`.
+pub type RaySession<'a> = Session<'a, BenchRaysArgs>;
 
 fn kernel_names() -> clap::builder::PossibleValuesParser {
     KERNELS.iter().map(|o| o.name).collect::<Vec<_>>().into()
@@ -144,9 +148,13 @@ mod tests {
 
     #[test]
     fn json_with_and_without_a_file() {
-        assert!(parse(&["--json"]).common.console().json);
+        assert!(parse(&["--json"]).common.outputs.console().json);
         let to_file = parse(&["--json=a.json", "scene"]);
-        assert!(!to_file.common.console().json && to_file.common.outputs.json_file().is_some() && to_file.scenes == ["scene"]);
+        assert!(
+            !to_file.common.outputs.console().json
+                && to_file.common.outputs.json_file().is_some()
+                && to_file.scenes == ["scene"]
+        );
         // a scene after --json is a scene
         assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
     }

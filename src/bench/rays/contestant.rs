@@ -1,13 +1,12 @@
 //! Contestants: our own tracers and kernels, and those of peers, behind one interface.
 
-use super::streams::{Set, sample};
 use crate::accel::flatten::FlatScene;
 use crate::bench::device::BenchDevice;
 use crate::bench::peers::process::{Peer, PeerError};
-use crate::bench::record::rays::BuildRecord;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::DeviceInfo;
+use crate::integrators::ray_sets::{RaySet, sample};
 use crate::integrators::rays::{Mode, PreparedRays};
 use crate::ray::{Hit, Ray};
 use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
@@ -68,12 +67,25 @@ enum Engine<'a> {
     Peer { peer: usize, kernel: String, flat: &'a FlatScene<'a> },
 }
 
+/// What building a contestant's hierarchy took.
+#[derive(Clone, Debug)]
+pub struct BuildCost {
+    /// Seconds to build the hierarchy.
+    pub seconds: f64,
+    /// Seconds to write the scene into device memory; `None` for peers.
+    pub upload_seconds: Option<f64>,
+    /// Bytes of nodes and primitives by stored primitive.
+    pub bytes_per_primitive: f64,
+    /// Cost of the hierarchy by the surface area heuristic, where it is known.
+    pub sah_cost: Option<f64>,
+}
+
 /// A contestant with a scene.
 pub struct Contestant<'a> {
     /// In tables.
     pub name: String,
     /// What building took.
-    pub build: BuildRecord,
+    pub build: BuildCost,
     /// Its answers have to agree with the reference.
     pub strict: bool,
     /// Which kernel of the compute tracer it is.
@@ -83,15 +95,11 @@ pub struct Contestant<'a> {
 
 impl<'a> Contestant<'a> {
     /// One of our own.
-    ///
-    /// # Errors
-    /// Those of [`BenchDevice::tracer`].
     pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
         let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
         let stats = tracer.stats();
-        let build = BuildRecord {
-            contestant: own.name.to_owned(),
-            build_seconds: stats.build_seconds,
+        let build = BuildCost {
+            seconds: stats.build_seconds,
             upload_seconds: Some(stats.upload_seconds),
             bytes_per_primitive: stats.bytes_per_primitive(),
             sah_cost: stats.sah_cost,
@@ -107,16 +115,12 @@ impl<'a> Contestant<'a> {
     }
 
     /// A kernel of a peer that has the scene.
-    ///
-    /// # Errors
-    /// When the peer fails to build.
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
         let name = peer.spec.title_of(kernel);
-        let (build_seconds, bytes) = peer.build(kernel)?;
-        let build = BuildRecord {
-            contestant: name.clone(),
-            build_seconds,
+        let (seconds, bytes) = peer.build(kernel)?;
+        let build = BuildCost {
+            seconds,
             upload_seconds: None,
             bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
             sah_cost: None,
@@ -126,7 +130,7 @@ impl<'a> Contestant<'a> {
     }
 
     /// Is it made for such rays? Packets are for coherent ones alone.
-    pub fn is_for(&self, set: Set) -> bool {
+    pub fn is_for(&self, set: RaySet) -> bool {
         self.kernel != Some(Kernel::Packet) || set.is_coherent()
     }
 
@@ -147,7 +151,7 @@ impl<'a> Contestant<'a> {
     }
 
     /// Makes ready for one stream.
-    pub fn prepare<'c>(&'c self, set: Set, rays: &[Ray], mode: Mode) -> Result<PreparedRun<'c>> {
+    pub fn prepare<'c>(&'c self, set: RaySet, rays: &[Ray], mode: Mode) -> Result<PreparedRun<'c>> {
         match &self.engine {
             Engine::Own { tracer, divisor } => {
                 let rays = sample(rays, *divisor);
@@ -162,9 +166,6 @@ impl<'a> Contestant<'a> {
     }
 
     /// Traces rays without timing and returns their hits.
-    ///
-    /// # Errors
-    /// Those of the device or the peer.
     pub fn hits(&self, peers: &mut [Peer], rays: &[Ray], mode: Mode, control: &mut dyn Control) -> Result<Vec<Hit>, PeerError> {
         match &self.engine {
             Engine::Own { tracer, .. } => {
@@ -203,9 +204,6 @@ pub struct RepeatTime {
 
 impl PreparedRun<'_> {
     /// One repeat.
-    ///
-    /// # Errors
-    /// Those of the device or the peer.
     pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<RepeatTime, PeerError> {
         match &mut self.engine {
             PreparedEngine::Own(prepared) => {
@@ -221,9 +219,6 @@ impl PreparedRun<'_> {
     }
 
     /// Number of rays of the last repeat that hit something.
-    ///
-    /// # Errors
-    /// Those of the device; [`Error::CheckFailed`] when the driver cut a traversal short.
     pub fn hit_count(&self) -> Result<u64, Error> {
         match &self.engine {
             PreparedEngine::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),

@@ -1,11 +1,11 @@
 //! `skylit bench rays --edges`: rays aimed at shared edges and vertices of closed meshes, through our tracers and those of others. None may get through; and what is met is held against the
 //! double-precision oracle.
 
+use super::args::RaySession;
 use super::contestant::Contestant;
-use super::{RaySession, table};
 use crate::accel::flatten::FlatScene;
 use crate::bench::peers::process::PeerError;
-use crate::bench::record::rays::EdgeRecord;
+use crate::bench::record::{Record, plain};
 use crate::error::{Error, Result};
 use crate::integrators::rays::Mode;
 use crate::measure::parity::judge_closest;
@@ -26,23 +26,55 @@ const MAX_EXAMPLES: usize = 4;
 /// Levels of the round body and segments of the disk, of many triangles each.
 const HARD: (u32, u32) = (7, 1000);
 
+/// Scene and part of these results in the record.
+const SCENE: &str = "closed meshes";
+const PART: &str = "rays at edges";
+
+/// What became of a contestant's rays at shared edges and vertices of closed meshes: how many met nothing, asked for any and for the closest hit; how many closest hits are the oracle's, are
+/// others that rounding allows (at an edge, either side of it, or none), and neither.
+const COUNTS: [&str; 7] = ["meshes", "rays", "leaks, any", "leaks, closest", "agree", "ties", "unexplained"];
+
+/// Counts of a contestant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EdgeCounts {
+    contestant: String,
+    /// In the order of [`COUNTS`].
+    counts: [u64; 7],
+    /// Whether leaks and unexplained answers are a failure: those of the compute tracer are.
+    is_watertight: bool,
+    /// The first of the unexplained.
+    examples: Vec<String>,
+}
+
+impl EdgeCounts {
+    fn fails(&self) -> bool {
+        let [_, _, any, closest, _, _, unexplained] = self.counts;
+        self.is_watertight && any + closest + unexplained > 0
+    }
+
+    fn add_to(&self, record: &mut Record) {
+        let mut row = record.row(SCENE, PART, &self.contestant);
+        for (name, count) in COUNTS.into_iter().zip(self.counts) {
+            row.exact(plain(name, ""), count as f64);
+        }
+    }
+}
+
 impl RaySession<'_> {
-    /// Sends the rays, and leaves the result in the record.
-    ///
-    /// # Errors
-    /// Those of our own side; Ctrl-C.
-    pub(super) fn edges(&mut self) -> Result<()> {
+    /// Sends the rays, and adds what became of them to `found` and to the record.
+    pub(super) fn edges(&mut self, found: &mut Vec<EdgeCounts>) -> Result<()> {
         let mut scenes = leak_scenes();
         scenes.extend(hard_leak_scenes(HARD.0, HARD.1));
         let each = (self.args.edge_rays() / scenes.len()).max(1);
         self.expect_jobs(scenes.len());
-        for (name, scene) in &scenes {
-            self.job(name, |session| session.edges_of(name, scene, each))?;
-        }
-        self.show(&table::edges(&self.record))
+        let sent =
+            scenes.iter().try_for_each(|(name, scene)| self.job(name, |session| session.edges_of(name, scene, each, found)));
+        // what there is, also where it failed
+        found.iter().for_each(|counts| counts.add_to(&mut self.record));
+        sent.and(self.show_scene(SCENE))
     }
 
-    fn edges_of(&mut self, name: &str, scene: &Scene, count: usize) -> Result<()> {
+    fn edges_of(&mut self, name: &str, scene: &Scene, count: usize, found: &mut Vec<EdgeCounts>) -> Result<()> {
         let flat = FlatScene::new(scene);
         let contestants = self.contestants(name, &flat)?;
         self.phase(format!("{name}: rays and what they meet in double precision"));
@@ -57,7 +89,7 @@ impl RaySession<'_> {
         for (done, contestant) in contestants.iter().enumerate() {
             self.phase(format!("{name}: '{}'", contestant.name));
             match self.edges_by(contestant, &oracle, &rays, &truth) {
-                Ok(found) => self.add_edges(found),
+                Ok(counts) => add_counts(found, counts),
                 Err(PeerError::Ours(e)) => return Err(e),
                 Err(PeerError::Failed(why)) => self.note(format!("{name}: '{}' left out: {why}", contestant.name)),
             }
@@ -73,7 +105,7 @@ impl RaySession<'_> {
         oracle: &Oracle,
         rays: &[Ray],
         truth: &[OracleHit],
-    ) -> Result<EdgeRecord, PeerError> {
+    ) -> Result<EdgeCounts, PeerError> {
         let own = contestant.tracer();
         let is_watertight = own.is_some_and(|t| t.kind() == TracerKind::Compute);
         let is_slow = own.is_some() && !is_watertight && self.device.info().is_cpu();
@@ -84,51 +116,54 @@ impl RaySession<'_> {
         let closest = contestant.hits(&mut self.peers, rays, Mode::Closest, &mut self.control)?;
         let report = judge_closest(oracle, rays, &closest, truth, Rounding::default());
         let examples = report.to_string().lines().skip(1).take(MAX_EXAMPLES).map(|l| l.trim().to_owned()).collect();
-        Ok(EdgeRecord {
-            contestant: contestant.name.clone(),
-            meshes: 1,
-            rays: report.rays,
-            leaks_any: missed(&any),
-            leaks_closest: missed(&closest),
-            agree: report.agree,
-            ties: report.ties,
-            unexplained: report.unexplained,
-            is_watertight,
-            strict: is_watertight,
-            examples,
-        })
+        let counts = [1, report.rays, missed(&any), missed(&closest), report.agree, report.ties, report.unexplained];
+        Ok(EdgeCounts { contestant: contestant.name.clone(), counts, is_watertight, examples })
     }
+}
 
-    fn add_edges(&mut self, found: EdgeRecord) {
-        match self.record.edges.iter_mut().find(|e| e.contestant == found.contestant) {
-            None => self.record.edges.push(found),
-            Some(sum) => {
-                sum.meshes += found.meshes;
-                sum.rays += found.rays;
-                sum.leaks_any += found.leaks_any;
-                sum.leaks_closest += found.leaks_closest;
-                sum.agree += found.agree;
-                sum.ties += found.ties;
-                sum.unexplained += found.unexplained;
-                sum.examples.extend(found.examples);
-                sum.examples.truncate(MAX_EXAMPLES);
-            }
+/// Adds the counts of a mesh to those that the contestant has already.
+fn add_counts(all: &mut Vec<EdgeCounts>, found: EdgeCounts) {
+    match all.iter_mut().find(|e| e.contestant == found.contestant) {
+        None => all.push(found),
+        Some(sum) => {
+            sum.counts.iter_mut().zip(found.counts).for_each(|(sum, count)| *sum += count);
+            sum.examples.extend(found.examples);
+            sum.examples.truncate(MAX_EXAMPLES);
         }
     }
 }
 
 /// Leaks of the compute tracer, and answers of it that nothing explains, are a failure.
-pub(super) fn verdict(edges: &[EdgeRecord]) -> Result<()> {
+pub(super) fn verdict(edges: &[EdgeCounts]) -> Result<()> {
     match edges.iter().find(|e| e.fails()) {
         None => Ok(()),
         Some(e) => Err(Error::CheckFailed(format!(
             "'{}': of {} rays at edges of closed meshes {} leave them asked for any hit, {} asked for the closest, and {} meet what rounding does not explain ({})",
             e.contestant,
-            e.rays,
-            e.leaks_any,
-            e.leaks_closest,
-            e.unexplained,
+            e.counts[1],
+            e.counts[2],
+            e.counts[3],
+            e.counts[6],
             e.examples.first().map_or("no example", String::as_str)
         ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_fails_at_edges() {
+        let counts = |is_watertight, leaks, unexplained| EdgeCounts {
+            is_watertight,
+            counts: [1, 9, leaks, 0, 0, 0, unexplained],
+            ..EdgeCounts::default()
+        };
+        assert!(verdict(&[counts(true, 0, 0), counts(false, 7, 3)]).is_ok());
+        assert!(counts(true, 1, 0).fails() && verdict(&[counts(true, 0, 1)]).is_err());
+        let mut all = vec![counts(true, 1, 0)];
+        add_counts(&mut all, counts(true, 2, 5));
+        assert_eq!((all.len(), all[0].counts), (1, [2, 18, 3, 0, 0, 0, 5]));
     }
 }

@@ -2,30 +2,35 @@
 //! all of them.
 
 mod args;
+mod check;
 mod contestant;
 mod edges;
 mod peer;
 mod scenes;
 mod streams;
-pub mod table;
 
 pub use args::BenchRaysArgs;
+use args::RaySession;
+use check::Check;
 use contestant::{Contestant, KERNELS, PreparedRun, RepeatTime};
+use edges::EdgeCounts;
 use scenes::RayScene;
-use streams::{RaySets, STREAMS, Set, StreamKind};
+use streams::{STREAMS, StreamKind};
 
+use super::chart;
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::record::rays::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
+use super::record::{BenchKind, Record, SIZE, plain, quantity};
 use super::scenes::check_exists;
 use super::session::Session;
-use super::table::Block;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::integrators::ray_sets::{RaySet, RaySets};
 use crate::integrators::rays::Mode;
 use crate::measure::agreement;
-use crate::measure::stats::{Summary, paired_ratio};
+use crate::measure::stats::{LogScaling, Percentiles, paired_ratio};
 use crate::ray::Ray;
+use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
 use crate::tracer::Kernel;
@@ -39,88 +44,110 @@ const VISITED_RAYS: usize = 20_000;
 /// Maximum number of primitives of scenes whose hierarchy is rebuilt for counting visits.
 const MAX_VISITED_PRIMITIVES: usize = 2_000_000;
 
-/// A run of `skylit bench rays`.
-type RaySession<'a> = Session<'a, BenchRaysArgs, RayBenchmark>;
+/// What became of answers that were held against others.
+#[derive(Default)]
+struct Findings {
+    checks: Vec<Check>,
+    edges: Vec<EdgeCounts>,
+    /// Contestants that ratios are given to.
+    baselines: Vec<String>,
+}
+
+/// What a contestant did with a stream.
+struct StreamRun {
+    name: String,
+    is_peers: bool,
+    is_wide: bool,
+    rays: f64,
+    hit_share: f64,
+    seconds: Vec<f64>,
+    wall_seconds: Option<Vec<f64>>,
+}
 
 /// Runs the benchmark, prints the results and writes the files.
-///
-/// # Errors
-/// The first error; the results measured so far are written nevertheless.
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(&args.scenes, args.common.quick);
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
     args.common.check_inputs(&scenes.sources, None, args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| RayBenchmark {
+    let mut session = Session::start(args, &args.common, |device| Record {
+        benchmark: BenchKind::Rays,
         host: device.host_info(),
-        repeats: args.repeats(),
-        size: args.size(),
-        build: args.build.name().to_owned(),
-        ..Default::default()
+        settings: [
+            ("rays".to_owned(), format!("{}x{}", args.size()[0], args.size()[1])),
+            ("build".to_owned(), args.build.name().to_owned()),
+        ]
+        .into(),
+        ..Record::default()
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
-    let measured = measure(&mut session, &scenes.sources, specs);
-    session.record.find_scaling();
-    let shown = session.show(&table::scaling(&session.record));
-    let agreed = check_agreement(args, &session.record).and(edges::verdict(&session.record.edges));
+    let mut findings = Findings::default();
+    let measured = measure(&mut session, &scenes.sources, specs, &mut findings);
+    let shown = add_scaling(&mut session);
+    let agreed = check::verdict(&findings.checks).and(edges::verdict(&findings.edges));
     session.finish(measured, !args.scenes.is_empty(), shown.and(agreed))
 }
 
-/// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree. The
-/// reference is ours, whoever it is held against.
-fn check_agreement(args: &BenchRaysArgs, record: &RayBenchmark) -> Result<()> {
-    let checks = || record.scenes.iter().flat_map(|s| s.checks.iter().filter(|c| c.fails()).map(move |c| (s, c)));
-    match checks().next() {
-        Some((scene, c)) if args.check => Err(Error::CheckFailed(format!(
-            "{}, {}: {} of {} answers of '{}' differ from those of '{}' by more than rounding{} ({}); {} such results in all",
-            scene.scene,
-            c.stream,
-            c.unexplained,
-            c.rays,
-            c.contestant,
-            c.reference,
-            match c.reference_unexplained {
-                0 => String::new(),
-                n => format!(", {n} of these because the latter are wrong"),
-            },
-            c.examples.first().map_or("no example", String::as_str),
-            checks().count()
-        ))),
-        _ => Ok(()),
-    }
-}
-
 /// All scenes. One that fails does not stop the others.
-fn measure(session: &mut RaySession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
+fn measure(
+    session: &mut RaySession,
+    scenes: &[String],
+    specs: Result<Vec<PeerSpec>, String>,
+    findings: &mut Findings,
+) -> Result<()> {
     session.start_peers(specs)?;
     let specs = session.peers.iter().map(|p| &p.spec);
-    session.record.baselines = specs.flat_map(|s| s.baselines.iter().map(|k| s.title_of(k))).collect();
+    findings.baselines = specs.flat_map(|s| s.baselines.iter().map(|k| s.title_of(k))).collect();
     session.record.peers = session.peer_titles();
-    let title = table::title(&session.record);
-    session.show(&[Block::Line(title)])?;
+    session.show_title()?;
     if session.args.edges {
-        return session.edges();
+        return session.edges(&mut findings.edges);
     }
     session.expect_jobs(scenes.len());
     for source in scenes {
         session.job(source, |session| {
-            let mut record = SceneRecord { scene: source.clone(), ..Default::default() };
-            let outcome = session.scene(source, &mut record);
+            let outcome = session.scene(source, findings);
             // what there is, also where it failed
-            if !record.streams.is_empty() {
-                session.show(&table::scene(&record, &session.record.baselines))?;
-                session.record.scenes.push(record);
-            }
+            session.show_scene(source)?;
             outcome
         })?;
     }
     Ok(())
 }
 
+/// Says of each family of scenes, stream and contestant how rates fall with size.
+fn add_scaling(session: &mut RaySession) -> Result<()> {
+    let rates: Vec<_> = session
+        .record
+        .measurements
+        .iter()
+        .filter(|m| m.quantity == quantity::RATE.name)
+        .filter_map(|m| {
+            let family = chart::family(&m.scene)?.to_owned();
+            let size = m.at.as_ref()?.value as u64;
+            Some(((family, m.part.clone(), m.contestant.clone()), (size, m.values.middle())))
+        })
+        .collect();
+    let keys = chart::distinct(rates.iter().map(|(key, _)| key));
+    for key in &keys {
+        let points: Vec<(u64, f64)> = rates.iter().filter(|(k, _)| k == *key).map(|(_, p)| *p).collect();
+        let Some(law) = LogScaling::of(&points) else { continue };
+        let (family, stream, contestant) = key;
+        let mut row = session.record.row(family, &format!("{stream} by size"), contestant);
+        row.exact(plain("falls as n to the power", ""), law.exponent);
+        row.exact(plain("worst x log n", ""), law.worst).exact(plain("at", ""), law.worst_at as f64);
+        let holds = if law.holds() { "yes" } else { "no" };
+        let remark = format!("{stream}, {contestant}: falls no faster than log n: {holds}");
+        session.record.scene(family).remarks.push(remark);
+    }
+    let families = chart::distinct(keys.iter().map(|(family, ..)| family));
+    families.into_iter().try_for_each(|family| session.show_scene(family))
+}
+
 impl RaySession<'_> {
-    /// Everything about one scene. `record` has what there is also where it fails.
-    fn scene(&mut self, source: &str, record: &mut SceneRecord) -> Result<()> {
+    /// Everything about one scene. The record has what there is also where it fails.
+    fn scene(&mut self, source: &str, findings: &mut Findings) -> Result<()> {
         let size = self.args.size();
         self.phase(format!("{source}: loading"));
         let loaded = scenes::load(source, self.args.alpha, self.args.ao_radius, f64::from(size[0]) / f64::from(size[1]))?;
@@ -137,33 +164,24 @@ impl RaySession<'_> {
             )));
         };
         self.phase(format!("{source}: making rays"));
-        let sets = RaySets::make(tracer, &loaded, size, &mut SilentControl)?;
-        *record = SceneRecord {
-            scene: source.to_owned(),
-            triangles: loaded.scene.triangle_count(),
-            spheres: loaded.scene.sphere_count(),
-            instances: loaded.scene.instances.len(),
-            stored_primitives: flat.primitive_count() as u64,
-            ao_radius: Some(loaded.ao_radius).filter(|r| r.is_finite()),
-            light: loaded.light.to_array(),
-            builds: contestants.iter().map(|c| c.build.clone()).collect(),
-            ..Default::default()
-        };
+        let (seen, lit) = ((&loaded.scene, &loaded.camera), (loaded.ao_radius, loaded.light));
+        let sets = RaySets::new(tracer, seen, lit, size, &mut SilentControl)?;
         // contestants that failed on the way
         let mut failed = vec![false; contestants.len()];
         let requested: Vec<&StreamKind> = STREAMS.iter().filter(|s| self.wants(s)).collect();
-        for set in Set::ALL {
+        for set in RaySet::ALL {
             if requested.iter().any(|s| s.set == set) {
-                self.give_rays(&contestants, &mut failed, set, sets.get(set))?;
+                self.load_rays(&contestants, &mut failed, set, sets.get(set))?;
             }
         }
         // the counter's tree is that of the default preset
         let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= MAX_VISITED_PRIMITIVES;
         let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
         let counter = if counted { VisitCounter::new(&flat) } else { None };
+        let mut traced: Vec<&StreamKind> = Vec::new();
         for (k, stream) in requested.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
-            if self.is_late() && !(record.streams.is_empty() && self.record.scenes.is_empty()) {
+            if self.is_over() {
                 self.stop_early();
                 self.note(format!("time limit: {source}: {} streams left out", requested.len() - k));
                 break;
@@ -180,13 +198,53 @@ impl RaySession<'_> {
             let all = if self.args.check { 1.0 - CHECK_SHARE } else { 1.0 };
             let share = [k, k + 1].map(|k| all * k as f64 / requested.len() as f64);
             self.phase(format!("{source}: {}", stream.name));
-            let results = self.stream(&contestants, &mut failed, stream, (rays, counter.as_ref()), share)?;
-            record.streams.push(results);
+            let runs = self.stream(&contestants, &mut failed, stream, rays, share)?;
+            if traced.is_empty() {
+                self.add_scene(source, &loaded, &flat, &contestants);
+            }
+            // a sample of the rays is enough
+            let some: Vec<Ray> = rays.iter().step_by(rays.len().div_ceil(VISITED_RAYS).max(1)).copied().collect();
+            let visits = counter.as_ref().map(|c| c.mean(&some, stream.mode == Mode::Any));
+            let size = (loaded.scene.triangle_count() + loaded.scene.sphere_count()) as f64;
+            for run in &runs {
+                let mut row = self.record.row(source, stream.name, &run.name).of_peer(run.is_peers);
+                let mut row = row.at(SIZE, size);
+                let rates = |seconds: &[f64]| Percentiles::of(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>());
+                row.repeated(quantity::RATE, rates(&run.seconds));
+                row.repeated(plain("wall rate", "Mrays/s"), run.wall_seconds.as_deref().and_then(rates));
+                row.exact(plain("traced", "rays"), run.rays).exact(plain("hit share", ""), run.hit_share);
+                // ratios round by round, to each baseline that ran
+                for base in runs.iter().filter(|base| findings.baselines.contains(&base.name)) {
+                    let ratio = paired_ratio(&run.seconds, run.rays, &base.seconds, base.rays);
+                    row.exact(plain(&format!("x {}", base.name), ""), ratio);
+                }
+                let visits = visits.filter(|_| run.is_wide);
+                row.exact(quantity::NODES, visits.map(|v| v.nodes));
+                row.exact(plain("leaves a ray", ""), visits.map(|v| v.leaves));
+            }
+            traced.push(stream);
         }
         if self.args.check {
-            self.check(&loaded, &contestants, &mut failed, &sets, record)?;
+            self.check(source, &loaded, &contestants, &mut failed, (&sets, &traced), findings)?;
         }
         Ok(())
+    }
+
+    /// Describes a scene, and says what building took.
+    fn add_scene(&mut self, source: &str, loaded: &RayScene, flat: &FlatScene, contestants: &[Contestant]) {
+        let (triangles, spheres) = (loaded.scene.triangle_count(), loaded.scene.sphere_count());
+        let mut about = vec![format!("{} triangles", thousands(triangles))];
+        about.extend((spheres > 0).then(|| format!("{} spheres", thousands(spheres))));
+        let (stored, instances) = (flat.primitive_count() as u64, loaded.scene.instances.len() as u64);
+        let is_shared = stored != triangles + spheres;
+        about.extend(is_shared.then(|| format!("{} stored, {} instances", thousands(stored), thousands(instances))));
+        self.record.scene(source).about = about.join(", ");
+        for contestant in contestants {
+            let (build, is_peers) = (&contestant.build, contestant.peer_index().is_some());
+            let mut row = self.record.row(source, "building", &contestant.name).of_peer(is_peers);
+            row.exact(plain("build", "s"), build.seconds).exact(plain("upload", "s"), build.upload_seconds);
+            row.exact(quantity::BYTES, build.bytes_per_primitive).exact(plain("SAH cost", ""), build.sah_cost);
+        }
     }
 
     fn wants(&self, stream: &StreamKind) -> bool {
@@ -242,7 +300,7 @@ impl RaySession<'_> {
     }
 
     /// Gives a set of rays to every peer that takes part.
-    fn give_rays(&mut self, contestants: &[Contestant], failed: &mut [bool], set: Set, rays: &[Ray]) -> Result<()> {
+    fn load_rays(&mut self, contestants: &[Contestant], failed: &mut [bool], set: RaySet, rays: &[Ray]) -> Result<()> {
         for index in 0..self.peers.len() {
             if !contestants.iter().zip(&*failed).any(|(c, f)| !f && c.peer_index() == Some(index)) {
                 continue;
@@ -265,9 +323,9 @@ impl RaySession<'_> {
         contestants: &[Contestant],
         failed: &mut [bool],
         stream: &StreamKind,
-        (rays, counter): (&[Ray], Option<&VisitCounter>),
+        rays: &[Ray],
         [from, to]: [f64; 2],
-    ) -> Result<StreamRecord> {
+    ) -> Result<Vec<StreamRun>> {
         let mut runs: Vec<PreparedRun> = Vec::new();
         for c in contestants {
             runs.push(c.prepare(stream.set, rays, stream.mode)?);
@@ -299,50 +357,39 @@ impl RaySession<'_> {
                 break;
             }
         }
-        // a sample of the rays is enough
-        let some: Vec<Ray> = rays.iter().step_by(rays.len().div_ceil(VISITED_RAYS).max(1)).copied().collect();
-        let visits = counter.map(|c| c.mean(&some, stream.mode == Mode::Any));
         let mut results = Vec::new();
         for (k, contestant) in contestants.iter().enumerate() {
             if failed[k] || times[k].is_empty() {
                 continue;
             }
-            let count = runs[k].rays as f64;
-            let seconds: Vec<f64> = times[k].iter().map(|l| l.device).collect();
-            let rates = |s: &[f64]| Summary::of(&s.iter().map(|s| count / s / 1e6).collect::<Vec<_>>());
-            let walls: Option<Vec<f64>> = times[k].iter().map(|l| l.wall).collect();
-            let Some(device) = rates(&seconds) else { continue };
-            results.push(RunRecord {
-                contestant: contestant.name.clone(),
-                rays: runs[k].rays,
-                hit_share: runs[k].hit_count()? as f64 / count,
-                device,
-                wall: walls.and_then(|w| rates(&w)),
-                seconds,
-                ratios: Vec::new(),
-                nodes_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.nodes),
-                leaves_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.leaves),
+            let rays = runs[k].rays as f64;
+            results.push(StreamRun {
+                name: contestant.name.clone(),
+                is_peers: contestant.peer_index().is_some(),
+                is_wide: contestant.kernel == Some(Kernel::Wide),
+                rays,
+                hit_share: runs[k].hit_count()? as f64 / rays,
+                seconds: times[k].iter().map(|t| t.device).collect(),
+                wall_seconds: times[k].iter().map(|t| t.wall).collect(),
             });
         }
-        give_ratios(&mut results, &self.record.baselines);
-        Ok(StreamRecord { stream: stream.name.to_owned(), rays: rays.len(), results })
+        Ok(results)
     }
 
     /// Compares all hits with those of skylit's first kernel.
     fn check(
         &mut self,
+        source: &str,
         loaded: &RayScene,
         contestants: &[Contestant],
         failed: &mut [bool],
-        sets: &RaySets,
-        record: &mut SceneRecord,
+        (sets, streams): (&RaySets, &[&StreamKind]),
+        findings: &mut Findings,
     ) -> Result<()> {
         let Some((first, reference)) = contestants.iter().enumerate().find(|(_, c)| c.tracer().is_some()) else {
             return Ok(());
         };
-        let source = record.scene.clone();
         self.phase(format!("{source}: checking"));
-        let streams: Vec<_> = STREAMS.iter().filter(|s| record.streams.iter().any(|r| r.stream == s.name)).collect();
         let pairs = (streams.len() * contestants.len()).max(1) as f64;
         for (done, stream) in streams.iter().enumerate() {
             if self.is_late() {
@@ -376,8 +423,10 @@ impl RaySession<'_> {
                 };
                 match compare() {
                     Ok(found) => {
-                        let check = CheckRecord::new(&contestant.name, &reference.name, stream.name, &found, contestant.strict);
-                        record.checks.push(check);
+                        let names = [source, stream.name, &contestant.name, &reference.name];
+                        let check = Check::new(names, &found, contestant.strict);
+                        check.add_to(&mut self.record);
+                        findings.checks.push(check);
                     }
                     Err(PeerError::Ours(e)) => return Err(e),
                     Err(PeerError::Failed(why)) => {
@@ -399,18 +448,4 @@ fn sure<T>(result: Result<T, PeerError>) -> Result<T> {
         PeerError::Ours(e) => e,
         PeerError::Failed(why) => Error::CheckFailed(why),
     })
-}
-
-/// Ratios to each baseline that ran, round by round.
-fn give_ratios(results: &mut [RunRecord], baselines: &[String]) {
-    for name in baselines {
-        let Some(base) = results.iter().find(|r| &r.contestant == name).map(|r| (r.seconds.clone(), r.rays as f64)) else {
-            continue;
-        };
-        for run in results.iter_mut() {
-            if let Some(ratio) = paired_ratio(&run.seconds, run.rays as f64, &base.0, base.1) {
-                run.ratios.push(Ratio { to: name.clone(), ratio });
-            }
-        }
-    }
 }

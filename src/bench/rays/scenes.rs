@@ -56,9 +56,6 @@ pub struct RayScene {
 }
 
 /// Loads a scene and chooses its view. `keep_alpha`: alpha masks do not count as opaque; `ao_radius`: instead of the scene's.
-///
-/// # Errors
-/// Those of loading.
 pub fn load(source: &str, keep_alpha: bool, ao_radius: Option<f64>, aspect: f64) -> Result<RayScene> {
     let mut scene = load::load(source)?;
     if !keep_alpha {

@@ -8,11 +8,13 @@ mod assemble;
 pub mod atrium;
 pub mod cornell;
 pub mod many;
+pub mod moving_box;
 pub mod parade;
 pub mod pendulum;
 mod random;
 pub mod room;
 pub mod shapes;
+pub mod sun_map;
 pub mod terrain;
 mod transform;
 

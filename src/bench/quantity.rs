@@ -1,0 +1,72 @@
+//! Quantities that benchmarks measure, each with its unit and which values are better.
+
+use serde::{Deserialize, Serialize};
+
+/// Which values of a quantity are better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Better {
+    /// Small ones.
+    Less,
+    /// Great ones.
+    More,
+    /// Neither: it is not compared with a baseline.
+    Neither,
+}
+
+/// A quantity with its unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Quantity<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its unit.
+    pub unit: &'a str,
+    /// Which values are better.
+    pub better: Better,
+}
+
+/// A quantity of which less is better.
+const fn less<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
+    Quantity { name, unit, better: Better::Less }
+}
+
+/// A quantity that is not compared with a baseline.
+pub const fn plain<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
+    Quantity { name, unit, better: Better::Neither }
+}
+
+impl Quantity<'_> {
+    /// The same, not compared with a baseline.
+    pub const fn not_compared(self) -> Self {
+        Self { better: Better::Neither, ..self }
+    }
+}
+
+/// Time of a frame.
+pub const FRAME_TIME: Quantity = less("time", "ms");
+/// Time of an image.
+pub const IMAGE_TIME: Quantity = less("time", "s");
+/// Time to bring a structure up to date.
+pub const UPDATE_TIME: Quantity = less("update", "ms");
+/// Root mean squared error, the reference's own included.
+pub const RMSE: Quantity = less("RMSE", "");
+/// Root mean squared error without the reference's.
+pub const CORRECTED: Quantity = plain("corrected RMSE", "");
+/// Root mean squared error of plain accumulation in the same time.
+pub const PLAIN_RMSE: Quantity = plain("plain RMSE", "");
+/// The same without the reference's.
+pub const PLAIN_CORRECTED: Quantity = plain("corrected plain RMSE", "");
+/// Error before the filter.
+pub const UNFILTERED: Quantity = plain("unfiltered RMSE", "");
+/// Rays a second.
+pub const RATE: Quantity = Quantity { name: "rate", unit: "Mrays/s", better: Better::More };
+/// Rays of a frame.
+pub const RAYS: Quantity = plain("rays", "");
+/// Camera rays of a frame.
+pub const CAMERA_RAYS: Quantity = plain("camera rays", "");
+/// Differences of consecutive frames.
+pub const FLICKER: Quantity = less("flicker", "");
+/// Bytes of a hierarchy.
+pub const BYTES: Quantity = less("bytes a primitive", "");
+/// Nodes that a ray visits.
+pub const NODES: Quantity = less("nodes a ray", "");
