@@ -207,6 +207,11 @@ impl RenderJob<'_> {
         f64::from(self.size[0]) / f64::from(self.size[1])
     }
 
+    /// Number of samples of all pixels together.
+    pub fn sample_count(&self) -> u64 {
+        u64::from(self.spp) * u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
     /// The camera as shaders read it.
     pub fn camera_record(&self, flat: &FlatScene) -> CameraRecord {
         CameraRecord::new(self.camera, flat.origin, self.aspect())

@@ -118,9 +118,9 @@ impl StillSequence<'_> {
     /// # Errors
     /// Those of [`Renderer::still`].
     pub fn render(&mut self, number: u32, control: &mut dyn Control) -> Result<Still> {
-        let begun = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
+        let started = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
         self.completed.camera = self.pose(number)?;
-        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), begun, control, &mut |_| Ok(()))?;
+        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), started, control, &mut |_| Ok(()))?;
         still.image.metadata.push(("frame".into(), number.to_string()));
         still.image.metadata.sort();
         Ok(still)
