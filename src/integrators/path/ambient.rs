@@ -6,7 +6,8 @@
 use glam::Vec3;
 
 pub use super::ambient_light::{Ambient, EnvironmentLight, OccludedLight};
-use super::{AMBIENT_COUNT, FirstSurfaceRays, PathEstimator, PathOptions, Strategy};
+use super::buffers::{AMBIENT_COUNT, FirstSurfaceRays};
+use super::{PathEstimator, PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
@@ -119,10 +120,10 @@ impl PathEstimator {
         let Some(ambient) = self.of_first_surface.iter().find(of_ambient) else { return Ok(Vec::new()) };
         let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.block_params[k].address(), ..push });
         commands.run(|r| {
-            self.queues[0].clear(r);
+            self.buffers.queues[0].clear(r);
             self.clear_light_queues(r);
             r.barrier();
-            self.camera.record(r, &camera);
+            self.pipelines.camera.record(r, &camera);
             r.barrier();
             distance.record(r, &ambient.queue.push(occlusion, push.count));
             r.barrier();
@@ -134,7 +135,7 @@ impl PathEstimator {
         let size = size_of::<AmbientSample>() as u64;
         // all samples of a pixel at once
         let record = size << MAX_SAMPLE_BITS;
-        self.radiance.read_with(0, size * u64::from(count), record, |first, bytes| {
+        self.buffers.radiance.read_with(0, size * u64::from(count), record, |first, bytes| {
             let samples: Vec<AmbientSample> = bytemuck::pod_collect_to_vec(bytes);
             take((first << MAX_SAMPLE_BITS) as u32, &samples);
         })
