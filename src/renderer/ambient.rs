@@ -6,7 +6,6 @@ use super::{RenderSettings, Renderer, TracerRequest};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
-use crate::integrators::RenderJob;
 use crate::integrators::path::ambient::{self, TakeSamples};
 use crate::scene::Motion;
 
@@ -29,12 +28,12 @@ impl Renderer {
         let ready = self.tracer.take();
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
-        let job = RenderJob { time_limit: None, ..settings.job(scene, &camera) };
+        let job = settings.job(scene, &camera);
         let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
         let request = TracerRequest {
             needs: integrator.needs(&settings.integrators),
             streams: integrator.streams(&settings.integrators),
-            rays: integrator.rays_per_sample() * job.sample_count(),
+            rays: integrator.rays_per_sample() * job.samples.count(),
             control: &mut *control,
             warnings: &mut warnings,
         };

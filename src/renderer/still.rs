@@ -1,7 +1,6 @@
 //! Stills: one image, rendered sample by sample.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -21,7 +20,6 @@ use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
-use crate::film::tile_mask::TileMask;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
@@ -141,7 +139,8 @@ impl Renderer {
         self.still_of(&completed, extras, (start, laps), control, save)
     }
 
-    /// Renders a still of completed settings. `started`: when work on it began, and the parts of its time so far.
+    /// Renders a still of completed settings. `started`: when work on it began, and the parts of
+    /// its time so far.
     pub(super) fn still_of(
         &mut self,
         completed: &Completed,
@@ -166,7 +165,7 @@ impl Renderer {
         let tracer = &ready.tracer;
         laps.lap("build");
         let camera = render.job.camera_record(&flat);
-        let tile_mask = render.tile_mask(&flat, &camera);
+        render.job.samples.tile_mask = render.job.tile_mask(render.integrator, &flat, &camera);
         laps.lap("prepare");
 
         // auxiliary outputs and denoiser first, because intermediate images contain them, too
@@ -182,7 +181,7 @@ impl Renderer {
 
         // the samples, and the image of them
         let composer = Composer { render: &render, pixels: &pixels, origin: flat.origin, denoising: denoising.as_ref() };
-        let rendered = render.trace(tracer, &flat, tile_mask, &composer, control, save)?;
+        let rendered = render.trace(tracer, &flat, &composer, control, save)?;
         laps.lap("trace");
         let image = composer.compose(&rendered.image, control)?;
         laps.lap(if denoising.is_some() { "denoise" } else { "film" });
@@ -231,7 +230,8 @@ impl<'a> StillRender<'a> {
         let Completed { camera, settings, .. } = completed;
         let (scene, info) = (&renderer.scene, &renderer.device.info);
         let integrator = settings.integrator().get();
-        let job = RenderJob { keep_rays: extras.keep_rays, ..settings.job(scene, camera) };
+        let mut job = settings.job(scene, camera);
+        job.samples.keep_rays = extras.keep_rays;
         let fingerprint = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
         Self {
             renderer,
@@ -251,17 +251,19 @@ impl<'a> StillRender<'a> {
     fn resume(&mut self, control: &mut dyn Control) -> Result<()> {
         let (settings, job) = (&self.completed.settings, &mut self.job);
         let (name, channels) = (&self.renderer.name, self.integrator.channels());
-        let resume = |path| film_file::resume(path, name, channels, job.size, job.spp, &self.identity, &self.rendered_by);
+        let resume = |path| {
+            film_file::resume(path, name, channels, job.samples.size, job.samples.spp, &self.identity, &self.rendered_by)
+        };
         let resumed = settings.film.resume.as_deref().map(resume).transpose()?;
         self.samples_before = resumed.as_ref().map(|r| r.state.max_samples());
         if let Some(warning) = resumed.as_ref().and_then(|r| r.warning.clone()) {
             control.warning(&warning);
             self.warnings.push(warning);
         }
-        job.film = FilmOptions {
+        job.samples.film = FilmOptions {
             start: resumed.map(|r| r.state.into()),
             keep_state: settings.film.keeps_state(),
-            intervals: stops(settings, self.extras, &job.scene.hints, job.spp),
+            intervals: stops(settings, self.extras, &job.scene.hints, job.samples.spp),
             target_rmse: settings.film.target_rmse,
         };
         Ok(())
@@ -282,20 +284,11 @@ impl<'a> StillRender<'a> {
             // the normals that tell surfaces apart
             needs: Needs { normals: needs.normals || is_denoised, ..needs },
             streams: self.integrator.streams(&settings.integrators),
-            rays: self.integrator.rays_per_sample() * self.job.sample_count(),
+            rays: self.integrator.rays_per_sample() * self.job.samples.count(),
             control,
             warnings: &mut self.warnings,
         };
         request.reuse_or_build(ready, device, *kind, flat, *compute, device_settings)
-    }
-
-    /// Finds the tiles that show geometry, if the others may be skipped.
-    fn tile_mask(&self, flat: &FlatScene, camera: &CameraRecord) -> Option<Arc<TileMask>> {
-        let job = &self.job;
-        if !self.integrator.skips_empty_tiles(job) {
-            return None;
-        }
-        TileMask::new(flat, camera, job.size, job.spp).map(Arc::new)
     }
 
     /// Traces auxiliary outputs, if any are wanted.
@@ -303,7 +296,7 @@ impl<'a> StillRender<'a> {
         if self.completed.settings.image.aov.is_empty() && !self.extras.aov {
             return Ok(Vec::new());
         }
-        aov::render(tracer, camera, self.job.size, control)
+        aov::render(tracer, camera, self.job.samples.size, control)
     }
 
     /// Traces all samples; `save` receives intermediate images.
@@ -311,7 +304,6 @@ impl<'a> StillRender<'a> {
         &self,
         tracer: &Tracer,
         flat: &FlatScene,
-        tile_mask: Option<Arc<TileMask>>,
         composer: &Composer,
         control: &mut dyn Control,
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
@@ -324,7 +316,7 @@ impl<'a> StillRender<'a> {
                 save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
             },
         };
-        let rendered = integrator.render(tracer, flat, &self.job, tile_mask, &mut interval_control)?;
+        let rendered = integrator.render(tracer, flat, &self.job, &mut interval_control)?;
         self.renderer.device.check_validation()?;
         Ok(rendered)
     }
@@ -356,16 +348,16 @@ impl<'a> StillRender<'a> {
             setup: Setup::new(self.renderer, tracer, flat, camera, choices, self.warnings),
             integrator: integrator.name(),
             quantity: integrator.quantity(),
-            size: job.size,
+            size: job.samples.size,
             spp: image.spp,
             most_spp: image.max_spp,
-            requested_spp: job.spp,
-            seed: job.seed,
+            requested_spp: job.samples.spp,
+            seed: job.samples.seed,
             stopped_early: image.stopped_early,
             mean,
             mean_standard_error,
             surface_mean,
-            film: FilmReport::new(&settings.film, &job.scene.hints, image, self.samples_before, job.spp),
+            film: FilmReport::new(&settings.film, &job.scene.hints, image, self.samples_before, job.samples.spp),
             compute,
             coherent_kernel: compute.map(|o| o.kernel.for_coherent(&self.renderer.device.info)),
             primary_rays: image.primary_rays,
@@ -397,8 +389,8 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
-/// Everything that must agree for a render to be resumed: all that its samples depend on, except its size.
-/// `scene`: the scene's fingerprint, if the film's state is kept.
+/// Everything that must agree for a render to be resumed: all that its samples depend on, except
+/// its size. `scene`: the scene's fingerprint, if the film's state is kept.
 pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Option<String>) -> Identity {
     let has_environment = scene.is_some() && integrator.sees_environment();
     let environment = has_environment.then(|| fingerprint::of_environment(&job.scene.environment));
@@ -408,7 +400,7 @@ pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Opti
         ("scene.hash", scene),
         ("environment.hash", environment),
         ("camera", Some(camera_text(job.camera))),
-        ("seed", Some(job.seed.to_string())),
+        ("seed", Some(job.samples.seed.to_string())),
     ];
     out.extend(integrator.identity(job));
     out
@@ -457,7 +449,8 @@ struct Composer<'a> {
 }
 
 impl Composer<'_> {
-    /// Composes the image of a film: its channels, denoised where that is wanted, auxiliary outputs and metadata.
+    /// Composes the image of a film: its channels, denoised where that is wanted, auxiliary outputs
+    /// and metadata.
     fn compose(&self, accumulated: &Accumulated, control: &mut dyn Control) -> Result<Image> {
         let mut channels = self.channels(accumulated);
         let mut metadata = self.metadata(accumulated);
@@ -466,7 +459,7 @@ impl Composer<'_> {
             metadata.push(("denoise".into(), denoising.name().into()));
         }
         channels.extend(aov::channels(&self.render.completed.settings.image.aov, self.pixels, self.origin));
-        let [width, height] = self.render.job.size;
+        let [width, height] = self.render.job.samples.size;
         Ok(Image { width, height, channels, metadata })
     }
 

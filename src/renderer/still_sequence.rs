@@ -110,7 +110,10 @@ impl StillSequence<'_> {
             None => !image.metadata.iter().any(|(k, _)| k == key) || key.ends_with(".hash"),
         });
         let scene = crate::files::portable_name(&self.renderer.name);
-        Ok(same && has("spp", &job.spp.to_string()) && has("scene", &scene) && [image.width, image.height] == self.size())
+        Ok(same
+            && has("spp", &job.samples.spp.to_string())
+            && has("scene", &scene)
+            && [image.width, image.height] == self.size())
     }
 
     /// Renders the still of a frame. Animations loop.

@@ -94,7 +94,7 @@ impl Signal {
     ) -> Result<Realtime> {
         let settings = self.of(preset);
         let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
-        let options = options.map(|options| PathOptions { seed: how.seed, ..options });
+        let options = options.map(|options| options.with_samples(|s| s.seed = how.seed));
         pipeline(tracer, flat, self.size, &how, options.as_ref())
     }
 
@@ -106,7 +106,7 @@ impl Signal {
         let how = self.frame_settings(Preset::Balanced)?;
         Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &how)? {
             Some(options) => {
-                let options = PathOptions { spp: MAX_PATHS, ..options };
+                let options = options.with_samples(|s| s.spp = MAX_PATHS);
                 Sampler::Paths { integrator: Box::new(PathIntegrator::new(tracer, flat, &options)?), options }
             }
             None => {

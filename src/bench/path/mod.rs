@@ -20,6 +20,7 @@ use super::session::Session;
 use super::table::Block;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{self, PathOptions};
 use crate::measure::metrics::ImagePair;
@@ -90,7 +91,7 @@ impl PathSession<'_> {
             ..SceneRecord::default()
         };
         let own = |strategy| -> Result<Engine> {
-            let options = PathOptions { size, spp: MAX_SPP, strategy, ..PathOptions::default() };
+            let options = PathOptions { samples: SampleSettings::new(size, MAX_SPP, 0), strategy, ..PathOptions::default() };
             Engine::own(&tracer, &flat, camera, &options)
         };
         let mut engine = own(path::Strategy::Mis)?;

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::scenes::RayScene;
 use crate::error::{Error, Result};
-use crate::film::Control;
 use crate::film::camera::CameraRecord;
+use crate::film::{Control, SampleSettings};
 use crate::integrators::ao::{self, AoOptions};
 use crate::integrators::rays::{Mode, PreparedRays};
 use crate::ray::{Hit, Ray};
@@ -84,7 +84,11 @@ impl RaySets {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let origin = scene.scene.origin();
         let camera = CameraRecord::new(&scene.camera, origin, aspect);
-        let options = AoOptions { size, spp: 1, seed: SEED, radius: scene.ao_radius, keep_rays: true, ..AoOptions::default() };
+        let options = AoOptions {
+            samples: SampleSettings { keep_rays: true, ..SampleSettings::new(size, 1, SEED) },
+            radius: scene.ao_radius,
+            ..AoOptions::default()
+        };
         let made = ao::render(tracer, &camera, &options, control)?;
         let (primary, occlusion) = (made.kept_primary, made.kept_occlusion);
         let mut prepared = PreparedRays::new(tracer, &primary, Mode::Closest)?;

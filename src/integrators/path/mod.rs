@@ -26,10 +26,10 @@ use glam::DMat3;
 
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
-use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
+use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
+use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Specialization, Timing};
 use crate::interface::{LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
@@ -96,7 +96,7 @@ pub fn render(
     options: &PathOptions,
     control: &mut dyn Control,
 ) -> Result<PathResult> {
-    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.spp, options.seed, control)
+    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.samples.spp, options.samples.seed, control)
 }
 
 /// Renders one scene repeatedly: lights, environment, queues and pipelines are created once.
@@ -106,12 +106,13 @@ pub struct PathIntegrator {
 }
 
 impl PathIntegrator {
-    /// Creates it for images of at most `options.spp` paths per pixel. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
+    /// Creates it for images of at most `options.samples.spp` paths per pixel. The tracer must have
+    /// been built from `flat` with [`crate::tracer::Needs::shading`].
     ///
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        let capacity = max_rays(launch_rays(&tracer.device().info), options.size, options.spp, MAX_SAMPLE_BITS);
+        let capacity = max_rays(launch_rays(&tracer.device().info), options.samples.size, options.samples.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
@@ -138,8 +139,8 @@ impl PathIntegrator {
 
     /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
     ///
-    /// # Errors
-    /// Those of the device; [`Error::Usage`] for more paths than `options.spp`; [`crate::Error::Interrupted`] when `control` says so.
+    /// # Errors Those of the device; [`Error::Usage`] for more paths than `options.samples.spp`;
+    /// [`crate::Error::Interrupted`] when `control` says so.
     pub fn render(
         &mut self,
         tracer: &Tracer,
@@ -150,23 +151,16 @@ impl PathIntegrator {
     ) -> Result<PathResult> {
         let Self { paths, options } = self;
         paths.find_camera_media(camera)?;
-        if spp > options.spp {
-            return Err(Error::Usage(format!("{spp} paths per pixel: the integrator was created for at most {}", options.spp)));
+        if spp > options.samples.spp {
+            return Err(Error::Usage(format!(
+                "{spp} paths per pixel: the integrator was created for at most {}",
+                options.samples.spp
+            )));
         }
-        let plan = Plan {
-            size: options.size,
-            spp,
-            seed,
-            time_limit: options.time_limit,
-            tile_mask: options.tile_mask.as_deref(),
-            film: &options.film,
-        };
+        let samples = SampleSettings { spp, seed, ..options.samples.clone() };
         paths.traced = PathCounts::default();
-        let params = BlockParams {
-            pixel_filter: options.pixel_filter as u32,
-            ..options.ambient.map(|a| a.block_params()).unwrap_or_default()
-        };
-        let image = accumulate(tracer, camera, &plan, &params, paths, control)?;
+        let params = options.ambient.map(|a| a.block_params()).unwrap_or_default();
+        let image = accumulate(tracer, camera, &samples, &params, paths, control)?;
         let PathCounts { bounce_rays, shadow_rays, ambient_rays, longest_path } = paths.traced;
         Ok(PathResult {
             image,
