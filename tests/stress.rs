@@ -5,6 +5,7 @@ mod common;
 
 use common::{assert_validation_clean, device};
 use glam::{DVec3, Vec3};
+use skylit::film::SampleSettings;
 use skylit::film::{Film, NoControl};
 use skylit::measure::ray_sets::{leak_rays, random_rays};
 use skylit::oracle::Oracle;
@@ -137,7 +138,8 @@ fn gpu_stress_catches_a_wrong_scale() {
 #[test]
 fn gpu_stress_catches_wrong_direct_light() {
     let (setup, mut quiet) = (setup(), Quiet);
-    let options = skylit::integrators::path::PathOptions { size: [16, 16], spp: 16, seed: 5, ..Default::default() };
+    let options =
+        skylit::integrators::path::PathOptions { samples: SampleSettings::new([16, 16], 16, 5), ..Default::default() };
     let mut check = |scene: &Scene, expected: f64| {
         let mut watch = Watch::new(&mut quiet);
         sampling::check_mean(&setup, TracerKind::Compute, "light", scene, &options, expected, 2e-6, &mut watch).unwrap()
@@ -210,7 +212,8 @@ fn gpu_stress_catches_a_wrong_spawn_offset() {
 fn gpu_stress_catches_wrong_layers() {
     let (setup, mut quiet) = (setup(), Quiet);
     let mut watch = Watch::new(&mut quiet);
-    let options = skylit::integrators::path::PathOptions { size: [16, 16], spp: 512, seed: 3, ..Default::default() };
+    let options =
+        skylit::integrators::path::PathOptions { samples: SampleSettings::new([16, 16], 512, 3), ..Default::default() };
     let (scene, _) = transparency::layers(60, 0.02);
     let (_, expected) = transparency::layers(64, 0.02);
     fails(&sampling::check_mean(&setup, TracerKind::Compute, "layers", &scene, &options, expected, 1e-5, &mut watch).unwrap());

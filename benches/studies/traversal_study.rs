@@ -13,8 +13,8 @@ use clap::{Parser, ValueEnum};
 use glam::DVec3;
 use serde_json::{Value, json};
 use skylit::accel::flatten::FlatScene;
-use skylit::film::NoControl;
 use skylit::film::camera::{self, CameraRecord, Choice};
+use skylit::film::{NoControl, SampleSettings};
 use skylit::gpu::{Device, Options};
 use skylit::integrators::ao::{self, AoOptions};
 use skylit::integrators::rays::{Mode, trace};
@@ -149,7 +149,8 @@ fn streams(device: &Arc<Device>, flat: &FlatScene, arguments: &Arguments) -> Res
     };
     let camera = CameraRecord::new(&camera::choose(flat.scene, &choice, aspect)?, flat.origin, aspect);
     let tracer = Tracer::new(device, TracerKind::Compute, flat, Needs::default())?;
-    let options = AoOptions { size, spp: 1, keep_rays: true, ..Default::default() };
+    let options =
+        AoOptions { samples: SampleSettings { keep_rays: true, ..SampleSettings::new(size, 1, 0) }, ..Default::default() };
     let kept = ao::render(&tracer, &camera, &options, &mut NoControl)?;
     let bounce: Vec<_> = kept.kept_occlusion.into_iter().filter(|r| r.tmax > r.tmin).collect();
     Ok([

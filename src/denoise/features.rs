@@ -89,15 +89,15 @@ impl Features {
     /// Those of [`aov::render`].
     pub fn render(shot: &DenoiseInput, control: &mut dyn Control) -> Result<Self> {
         let DenoiseInput { tracer, scene, camera, options } = *shot;
-        let [width, height] = options.size;
+        let [width, height] = options.samples.size;
         let pixels = width as usize * height as usize;
-        let centres = aov::render(tracer, camera, options.size, control)?;
+        let centres = aov::render(tracer, camera, options.samples.size, control)?;
         let mut albedo = vec![Vec3::ZERO; pixels];
         let mut normals = vec![Vec3::ZERO; pixels];
         let mut coverage = vec![0.0; pixels];
         let mut content = vec![PixelContent::OneSurface; pixels];
         let look = PinholeView::new(camera, height);
-        let reach = reach(options.pixel_filter);
+        let reach = reach(options.samples.pixel_filter);
         let share = 1.0 / (GRID * GRID) as f32;
         let fine = [width * GRID, height * GRID];
         aov::visit(tracer, camera, fine, Primary::Traced, control, &mut |index, point| {

@@ -10,9 +10,9 @@ use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
 use super::pace::Pace;
-use super::schedule::{FilmOptions, Step};
+use super::samples::SampleSettings;
+use super::schedule::Step;
 use super::state::{FilmState, tiles};
-use super::tile_mask::TileMask;
 use super::{Film, FilmPixel, MAX_CHANNELS, record_bytes, record_words};
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -43,28 +43,12 @@ pub(crate) trait Estimator {
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>>;
 }
 
-/// Parameters of [`accumulate`].
-pub(crate) struct Plan<'a> {
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Samples per pixel.
-    pub spp: u32,
-    /// Seed of the sampler.
-    pub seed: u32,
-    /// Stop after this time and keep the samples taken so far.
-    pub time_limit: Option<Duration>,
-    /// Tiles of the image that can contain geometry; `None` traces all tiles.
-    pub tile_mask: Option<&'a TileMask>,
-    /// Initial state and intermediate stops of the film.
-    pub film: &'a FilmOptions,
-}
-
 /// An accumulated image and its statistics. Ray counts and times are those of this run.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulated {
     /// The image.
     pub film: Film,
-    /// Its exact sums, if [`FilmOptions::keep_state`] is set.
+    /// Its exact sums, if [`super::schedule::FilmOptions::keep_state`] is set.
     pub state: Option<FilmState>,
     /// Minimum samples per pixel.
     pub spp: u32,
@@ -72,7 +56,7 @@ pub struct Accumulated {
     pub max_spp: u32,
     /// Rendering stopped before all samples were taken.
     pub stopped_early: bool,
-    /// Converged tiles, if [`FilmOptions::target_rmse`] is set.
+    /// Converged tiles, if [`super::schedule::FilmOptions::target_rmse`] is set.
     pub converged: Option<TileCount>,
     /// Camera rays traced.
     pub primary_rays: u64,
@@ -140,7 +124,8 @@ impl Batch {
     }
 }
 
-/// Accumulates the samples of a plan. `params`: the estimator's own block parameters; camera, size and film are filled in.
+/// Accumulates the samples of an image. `params`: the estimator's own block parameters; what
+/// follows from camera, samples and film is filled in.
 ///
 /// When `control` requests a stop, only complete samples are kept, so that all pixels of a tile have the same count. The batch in
 /// progress is abandoned for that, unless the pixels have no sample yet.
@@ -150,27 +135,27 @@ impl Batch {
 pub(crate) fn accumulate<E: Estimator>(
     tracer: &Tracer,
     camera: &CameraRecord,
-    plan: &Plan,
+    samples: &SampleSettings,
     params: &BlockParams,
     estimator: &mut E,
     control: &mut dyn Control,
 ) -> Result<Accumulated> {
-    let (start, options) = (Instant::now(), plan.film);
-    let [tiles_x, tiles_y] = tiles(plan.size);
-    let mut out = Accumulated { film: Film::new(plan.size[0], plan.size[1], E::CHANNELS), ..Default::default() };
+    let (start, options) = (Instant::now(), &samples.film);
+    let [tiles_x, tiles_y] = tiles(samples.size);
+    let mut out = Accumulated { film: Film::new(samples.size[0], samples.size[1], E::CHANNELS), ..Default::default() };
     let mut tile_samples = vec![0; tiles_x * tiles_y];
     if options.needs_state() {
         let state = match options.start.as_deref() {
-            None => FilmState::new(plan.size, E::CHANNELS),
-            Some(s) if s.size() == plan.size && s.channels() == E::CHANNELS => s.clone(),
+            None => FilmState::new(samples.size, E::CHANNELS),
+            Some(s) if s.size() == samples.size && s.channels() == E::CHANNELS => s.clone(),
             Some(s) => {
                 return Err(Error::Usage(format!(
                     "a film of {}x{} pixels with {} channels cannot be resumed as one of {}x{} with {}; render with the same size and integrator",
                     s.size()[0],
                     s.size()[1],
                     s.channels(),
-                    plan.size[0],
-                    plan.size[1],
+                    samples.size[0],
+                    samples.size[1],
                     E::CHANNELS
                 )));
             }
@@ -179,7 +164,7 @@ pub(crate) fn accumulate<E: Estimator>(
         out.film = state.film();
         out.state = Some(state);
     }
-    let blocks = Block::cut(plan.size);
+    let blocks = Block::cut(samples.size);
     let launcher = Launcher {
         tracer,
         estimator,
@@ -187,8 +172,8 @@ pub(crate) fn accumulate<E: Estimator>(
         pace: Pace::up_to(launch_rays(&tracer.device().info)),
     };
     let rates = vec![Rate::default(); blocks.len()];
-    let mut run = Run { launcher, camera, plan, params, start, blocks, rates, tile_samples, out };
-    let mut next = options.next(plan.spp, &run.tile_samples, &run.out.film);
+    let mut run = Run { launcher, camera, samples, params, start, blocks, rates, tile_samples, out };
+    let mut next = options.next(samples.spp, &run.tile_samples, &run.out.film);
     while let Some(step) = next {
         let most = run.tile_samples.iter().copied().max().unwrap_or(0);
         let stopped = run.step(&step, control)?;
@@ -196,7 +181,7 @@ pub(crate) fn accumulate<E: Estimator>(
             state.set_tile_samples(&run.tile_samples);
             run.out.film = state.film();
         }
-        next = options.next(plan.spp, &run.tile_samples, &run.out.film);
+        next = options.next(samples.spp, &run.tile_samples, &run.out.film);
         run.sum_up();
         if stopped {
             break;
@@ -220,7 +205,7 @@ pub(crate) fn accumulate<E: Estimator>(
 struct Run<'a, E> {
     launcher: Launcher<'a, E>,
     camera: &'a CameraRecord,
-    plan: &'a Plan<'a>,
+    samples: &'a SampleSettings,
     params: &'a BlockParams,
     start: Instant,
     blocks: Vec<Block>,
@@ -254,7 +239,7 @@ impl<E: Estimator> Run<'_, E> {
         let work = |g: &TileGroup| f64::from(step.goal - g.first) * g.tiles.len() as f64;
         let (mut to_do, mut late, mut stop_requested) = (groups.iter().map(work).sum::<f64>(), false, false);
         let pixels_of = |tiles: usize| tiles as u64 * u64::from(TILE_PIXELS);
-        let total = pixels_of(self.tile_samples.len()) * u64::from(self.plan.spp);
+        let total = pixels_of(self.tile_samples.len()) * u64::from(self.samples.spp);
         let mut done = total - (u64::from(TILE_PIXELS) * step.left).min(total);
         for group in groups {
             // a stop was requested and these pixels have samples: start nothing more
@@ -264,7 +249,7 @@ impl<E: Estimator> Run<'_, E> {
             // the remaining time is divided in proportion to the remaining work
             let share = work(&group) / to_do.max(1.0);
             to_do -= work(&group);
-            let deadline = self.plan.time_limit.map(|limit| {
+            let deadline = self.samples.time_limit.map(|limit| {
                 let left = limit.saturating_sub(self.start.elapsed());
                 Instant::now() + left.mul_f64(share.min(1.0))
             });
@@ -295,7 +280,7 @@ impl<E: Estimator> Run<'_, E> {
                 rate.seconds += began.elapsed().as_secs_f64();
                 rate.samples += u64::from(pixel_batch.pixels) * u64::from(batch.samples());
                 control.progress(done + pixels * u64::from(sample - group.first), total);
-                if sample >= self.plan.spp {
+                if sample >= self.samples.spp {
                     break;
                 }
                 let too_late = deadline.is_some_and(|d| Instant::now() >= d);
@@ -313,7 +298,7 @@ impl<E: Estimator> Run<'_, E> {
 
     /// The tiles of a block that a step samples, grouped by their number of samples.
     fn groups(&self, step: &Step, number: usize, block: &Block) -> Vec<TileGroup> {
-        let width = self.plan.size[0];
+        let width = self.samples.size[0];
         let mut of_samples: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for tile in 0..block.tiles() {
             let at = block.image_tile(tile, width);
@@ -321,7 +306,7 @@ impl<E: Estimator> Run<'_, E> {
                 of_samples.entry(self.tile_samples[at]).or_default().push(tile);
             }
         }
-        let live = self.plan.tile_mask.and_then(|c| c.tiles(block));
+        let live = self.samples.tile_mask.as_ref().and_then(|c| c.tiles(block));
         let group = |(first, tiles): (u32, Vec<u32>)| {
             let traced = match &live {
                 None if tiles.len() as u32 == block.tiles() => None,
@@ -337,11 +322,11 @@ impl<E: Estimator> Run<'_, E> {
     /// Uploads a tile group with the current sums of its pixels.
     fn pixel_batch(&mut self, group: &TileGroup) -> Result<PixelBatch> {
         let device = self.launcher.tracer.device();
-        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.plan, self.params, E::CHANNELS)?;
+        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.samples, self.params, E::CHANNELS)?;
         let record = record_bytes(E::CHANNELS);
         match &self.out.state {
             Some(state) if group.first > 0 => {
-                let (tiles, width) = (pixel_batch.tiles.as_deref(), self.plan.size[0]);
+                let (tiles, width) = (pixel_batch.tiles.as_deref(), self.samples.size[0]);
                 pixel_batch.film.fill(record * pixel_batch.pixels as u64, record, |first, bytes| {
                     for (k, bytes) in bytes.chunks_exact_mut(record as usize).enumerate() {
                         match group.image_index(tiles, first as u32 + k as u32, width) {
@@ -358,7 +343,7 @@ impl<E: Estimator> Run<'_, E> {
 
     /// Reads back a group's pixels, which have `samples` samples each now.
     fn take(&mut self, group: &TileGroup, pixel_batch: &PixelBatch, samples: u32) -> Result<()> {
-        let (width, out) = (self.plan.size[0], &mut self.out);
+        let (width, out) = (self.samples.size[0], &mut self.out);
         let taken = u64::from(samples - group.first);
         let mut inside = 0u64;
         for &tile in &group.tiles {
@@ -402,7 +387,7 @@ impl<E: Estimator> Run<'_, E> {
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
         self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
-        self.out.converged = self.plan.film.target_rmse.map(|target| TileErrors::of(&self.out.film).count(target));
+        self.out.converged = self.samples.film.target_rmse.map(|target| TileErrors::of(&self.out.film).count(target));
     }
 }
 
@@ -489,7 +474,7 @@ impl PixelBatch {
         device: &Arc<Device>,
         group: &TileGroup,
         camera: &CameraRecord,
-        plan: &Plan,
+        samples: &SampleSettings,
         params: &BlockParams,
         channels: usize,
     ) -> Result<Self> {
@@ -503,7 +488,8 @@ impl PixelBatch {
         let params = BlockParams {
             film: film.address(),
             tiles: tile_buffer.as_ref().map_or(0, Buffer::address),
-            ..params.at(&group.block, plan.size, camera, plan.seed)
+            pixel_filter: samples.pixel_filter as u32,
+            ..params.at(&group.block, samples.size, camera, samples.seed)
         };
         Ok(Self { params, tiles, pixels, film, before: None, _tile_buffer: tile_buffer })
     }

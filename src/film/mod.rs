@@ -11,11 +11,13 @@ pub mod camera;
 mod control;
 pub mod convergence;
 pub mod pace;
+mod samples;
 pub mod schedule;
 pub mod state;
 pub mod tile_mask;
 
 pub use control::{Control, NoControl};
+pub use samples::SampleSettings;
 
 use crate::interface::records::film::{RgbFilmPixel, ScalarFilmPixel};
 

@@ -17,7 +17,7 @@ pub struct FilmOptions {
     /// Samples per pixel at which [`crate::film::Control::interval`] is called, ascending.
     pub intervals: Vec<u32>,
     /// Stop sampling tiles whose standard error is at most this (in units of the image), tested at powers of two of samples from
-    /// [`FIRST_CHECK`] on. The plan's samples are then the maximum.
+    /// [`FIRST_CHECK`] on. The samples per pixel are then the maximum.
     pub target_rmse: Option<f64>,
 }
 

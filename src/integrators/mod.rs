@@ -12,7 +12,6 @@ pub mod ray_sets;
 pub mod rays;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use serde_json::{Map, Value};
 
@@ -23,12 +22,10 @@ pub use all::{ALL, IntegratorName, check};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
-use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
-use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
-use crate::interface::PixelFilter;
+use crate::film::{Control, SampleSettings};
 use crate::output::Image;
 use crate::output::tone_map::ToneMap;
 use crate::ray::Ray;
@@ -63,22 +60,10 @@ pub struct RenderJob<'a> {
     pub scene: &'a Scene,
     /// The camera.
     pub camera: &'a Camera,
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Samples per pixel.
-    pub spp: u32,
-    /// Seed of the sampler.
-    pub seed: u32,
-    /// Pixel reconstruction filter.
-    pub pixel_filter: PixelFilter,
+    /// Settings of its samples.
+    pub samples: SampleSettings,
     /// Settings of integrators.
     pub settings: &'a IntegratorSettings,
-    /// Stop after this time and keep the image so far.
-    pub time_limit: Option<Duration>,
-    /// Keep the rays of the first sample.
-    pub keep_rays: bool,
-    /// The film to resume, and when to save it.
-    pub film: FilmOptions,
 }
 
 /// Options of the conversion to 8 bits per channel.
@@ -110,7 +95,7 @@ pub struct Rendered {
     pub image: Accumulated,
     /// The integrator's report.
     pub report: IntegratorReport,
-    /// Camera rays and occlusion rays of the first sample, if [`RenderJob::keep_rays`] is set.
+    /// Camera rays and occlusion rays of the first sample, if [`SampleSettings::keep_rays`] is set.
     pub kept_rays: [Vec<Ray>; 2],
 }
 
@@ -164,18 +149,11 @@ pub trait Integrator: Sync {
     /// metadata.
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
 
-    /// Renders. `tile_mask`: the tiles of the image that show geometry; the others are skipped.
+    /// Renders.
     ///
     /// # Errors
     /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera; [`crate::Error::Interrupted`] when `control` says so.
-    fn render(
-        &self,
-        tracer: &Tracer,
-        flat: &FlatScene,
-        job: &RenderJob,
-        tile_mask: Option<Arc<TileMask>>,
-        control: &mut dyn Control,
-    ) -> Result<Rendered>;
+    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered>;
 
     /// Converts the image to what an 8-bit file shows.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image;
@@ -196,8 +174,7 @@ pub trait Integrator: Sync {
     fn denoise_options(&self, job: &RenderJob) -> Result<Option<path::PathOptions>> {
         let path = self.path_options(job)?;
         // ambient occlusion is like the light of a white sky: its noise does not depend on materials
-        let grey =
-            || path::PathOptions { size: job.size, pixel_filter: job.pixel_filter, white_sky: Some(1.0), ..Default::default() };
+        let grey = || path::PathOptions { samples: job.samples.clone(), white_sky: Some(1.0), ..Default::default() };
         Ok(path.or_else(|| self.can(Capability::Denoising).then(grey)))
     }
 }
@@ -205,11 +182,20 @@ pub trait Integrator: Sync {
 impl RenderJob<'_> {
     /// Width over height.
     pub fn aspect(&self) -> f64 {
-        f64::from(self.size[0]) / f64::from(self.size[1])
+        f64::from(self.samples.size[0]) / f64::from(self.samples.size[1])
     }
 
     /// The camera as shaders read it.
     pub fn camera_record(&self, flat: &FlatScene) -> CameraRecord {
         CameraRecord::new(self.camera, flat.origin, self.aspect())
+    }
+
+    /// Finds the tiles of the image that can show geometry; `None` if the integrator needs all
+    /// tiles.
+    pub fn tile_mask(&self, integrator: &dyn Integrator, flat: &FlatScene, camera: &CameraRecord) -> Option<Arc<TileMask>> {
+        if !integrator.skips_empty_tiles(self) {
+            return None;
+        }
+        TileMask::new(flat, camera, self.samples.size, self.samples.spp).map(Arc::new)
     }
 }

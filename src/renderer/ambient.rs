@@ -6,7 +6,6 @@ use super::{RenderSettings, Renderer, TracerRequest};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
-use crate::integrators::RenderJob;
 use crate::integrators::path::ambient::{self, TakeSamples};
 use crate::scene::Motion;
 
@@ -25,18 +24,16 @@ impl Renderer {
         settings.check()?;
         let Completed { camera, settings, .. } = self.complete(settings, None)?;
         let integrator = settings.integrator().get();
-        let size = settings.size(&self.scene);
         let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
         let ready = self.tracer.take();
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
-        let job = RenderJob { time_limit: None, ..settings.job(scene, &camera) };
+        let job = settings.job(scene, &camera);
         let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
-        let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
         let request = TracerRequest {
             needs: integrator.needs(&settings.integrators),
             streams: integrator.streams(&settings.integrators),
-            rays,
+            rays: integrator.rays_per_sample() * job.samples.count(),
             control: &mut *control,
             warnings: &mut warnings,
         };

@@ -16,7 +16,7 @@ const HASH: &str = ".hash";
 pub type Identity = Vec<(&'static str, Option<String>)>;
 
 /// The tracer and the device that rendered an image.
-pub type Maker = [(&'static str, String); 2];
+pub type RenderedBy = [(&'static str, String); 2];
 
 /// A film's sums as channels of an image; `names` are the names of its values.
 pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
@@ -48,7 +48,7 @@ pub struct Resumed {
 }
 
 /// Reads the film from an image file, for an image of `size` pixels with `spp` samples in all, whose values are called `names`. `scene` is the scene's name;
-/// `identity` and `maker` are those of this render.
+/// `identity` and `rendered_by` are those of this render.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`], naming the difference, for one of a
@@ -60,7 +60,7 @@ pub fn resume(
     size: [u32; 2],
     spp: u32,
     identity: &Identity,
-    maker: &Maker,
+    rendered_by: &RenderedBy,
 ) -> Result<Resumed> {
     let image = output::exr::read(path)?;
     let state = read_state(&image, names);
@@ -90,7 +90,7 @@ pub fn resume(
             state.max_samples()
         )));
     }
-    let other = maker.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));
+    let other = rendered_by.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));
     let warning = other.map(|(key, ours)| {
         format!(
             "{} was started with {key} {}, and is resumed with {ours}: correct, but not bit-identical to an uninterrupted render",

@@ -18,7 +18,7 @@ use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::{PathOptions, PixelFilter};
-use crate::integrators::{IntegratorName, PictureOptions, RenderJob};
+use crate::integrators::{IntegratorName, PictureOptions};
 use crate::output::png::Colour;
 use crate::output::{Channel, Image, Samples};
 use crate::realtime::display::{Display, DisplayMode};
@@ -413,7 +413,8 @@ pub fn frame_path_options(
     if is_ambient_occlusion(settings.integrator()) {
         return Ok(None);
     }
-    let job = RenderJob { size, spp: how.rays_per_pixel, ..settings.job(scene, camera) };
+    let mut job = settings.job(scene, camera);
+    (job.samples.size, job.samples.spp) = (size, how.rays_per_pixel);
     let options = settings.integrator().get().path_options(&job)?;
     let rr_depth = settings.integrators.path.rr_depth.unwrap_or(settings.frames.preset.unwrap_or_default().rr_depth());
     Ok(options.map(|options| PathOptions { rr_depth, ..options }))

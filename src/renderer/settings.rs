@@ -10,8 +10,8 @@ use super::survey::framing::{self, ChosenCamera, ViewName};
 use crate::denoise::DenoiseChoice;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::film::SampleSettings;
 use crate::film::camera::{self, Choice};
-use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::Aov;
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::path::PixelFilter;
@@ -558,14 +558,15 @@ impl RenderSettings {
         RenderJob {
             scene,
             camera,
-            size: self.size(scene),
-            spp: self.spp(scene),
-            seed: self.seed(),
-            pixel_filter: self.pixel_filter(),
+            samples: SampleSettings {
+                size: self.size(scene),
+                spp: self.spp(scene),
+                seed: self.seed(),
+                pixel_filter: self.pixel_filter(),
+                time_limit: self.image.time_limit.map(Duration::from_secs_f64),
+                ..SampleSettings::default()
+            },
             settings: &self.integrators,
-            time_limit: self.image.time_limit.map(Duration::from_secs_f64),
-            keep_rays: false,
-            film: FilmOptions::default(),
         }
     }
 }

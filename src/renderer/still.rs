@@ -1,7 +1,6 @@
 //! Stills: one image, rendered sample by sample.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -9,24 +8,24 @@ use glam::DVec3;
 use super::brightness;
 use super::complete::{CHOSEN, Completed};
 use super::denoising::{self, Denoising};
-use super::film_file::{self, Identity, Maker};
+use super::film_file::{self, Identity, RenderedBy};
 use super::laps::{self, Laps};
 use super::report::{FilmReport, Seconds, Setup, StillReport};
-use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
+use super::{ReadyTracer, RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::denoise;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
+use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
-use crate::film::tile_mask::TileMask;
 use crate::integrators::aov::{self, Aov, AovPixel};
-use crate::integrators::{Integrator, PictureOptions, RenderJob};
+use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
-use crate::tracer::Needs;
+use crate::tracer::{Needs, Tracer};
 
 /// Additional results of a still.
 #[derive(Clone, Copy, Debug, Default)]
@@ -140,154 +139,235 @@ impl Renderer {
         self.still_of(&completed, extras, (start, laps), control, save)
     }
 
-    /// Renders a still of completed settings. `begun`: when work on it began, and the parts of its time so far.
+    /// Renders a still of completed settings. `started`: when work on it began, and the parts of
+    /// its time so far.
     pub(super) fn still_of(
         &mut self,
         completed: &Completed,
         extras: StillExtras,
-        begun: (Instant, Laps),
+        started: (Instant, Laps),
         control: &mut dyn Control,
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Still> {
-        let Completed { camera, settings, choices, .. } = completed;
-        let chosen = completed.options();
-        let (start, mut laps) = begun;
-        let denoiser = denoising::choose(settings.image.denoise)?;
-        let integrator = settings.integrator().get();
-        let size = settings.size(&self.scene);
-        let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
+        let (start, mut laps) = started;
+        let denoiser = denoising::choose(completed.settings.image.denoise)?;
         let ready = self.tracer.take();
-        let scene = &self.scene;
-        let mut warnings = scene_warnings(scene);
-        warnings.iter().for_each(|w| control.warning(w));
-        let mut job = RenderJob { keep_rays: extras.keep_rays, ..settings.job(scene, camera) };
-        let prints = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
-        let identity = identity(integrator, &job, prints);
-        let maker: Maker =
-            [("tracer", kind.name().into()), ("device", format!("{} ({})", device.info.name, device.info.driver))];
-        let resumed = settings
-            .film
-            .resume
-            .as_ref()
-            .map(|path| film_file::resume(path, &self.name, integrator.channels(), size, job.spp, &identity, &maker));
-        let resumed = resumed.transpose()?;
-        let samples_before = resumed.as_ref().map(|r| r.state.max_samples());
-        if let Some(warning) = resumed.as_ref().and_then(|r| r.warning.clone()) {
-            control.warning(&warning);
-            warnings.push(warning);
-        }
-        job.film = FilmOptions {
-            start: resumed.map(|r| r.state.into()),
-            keep_state: settings.film.keeps_state(),
-            intervals: stops(settings, extras, &scene.hints, job.spp),
-            target_rmse: settings.film.target_rmse,
-        };
-        let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
-        let wanted = &settings.image.aov;
-        let needs = aov_needs(integrator.needs(&settings.integrators), wanted);
-        // the normals that tell surfaces apart
-        let needs = Needs { normals: needs.normals || denoiser.is_some(), ..needs };
-        let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
-        let streams = integrator.streams(&settings.integrators);
-        let request = TracerRequest { needs, streams, rays, control: &mut *control, warnings: &mut warnings };
-        laps.lap("prepare");
-        let ready = request.reuse_or_build(ready, &device, kind, &flat, compute, &self.settings)?;
-        laps.lap("build");
-        let tracer = &ready.tracer;
-        let record = job.camera_record(&flat);
-        let tile_mask = match integrator.skips_empty_tiles(&job) {
-            true => TileMask::new(&flat, &record, size, job.spp).map(Arc::new),
-            false => None,
-        };
+        let mut render = StillRender::new(self, completed, extras);
+        render.warnings.iter().for_each(|w| control.warning(w));
 
+        // the film: empty, or that of the image that is resumed
+        render.resume(control)?;
+
+        // the scene in device memory, and what of the image can show it
+        let flat = FlatScene::with_motion_and_blend(&self.scene, Motion::default(), render.integrator.blend())?;
         laps.lap("prepare");
-        // first, because intermediate images contain them, too
+        let ready = render.build(ready, &flat, denoiser.is_some(), control)?;
+        let tracer = &ready.tracer;
+        laps.lap("build");
+        let camera = render.job.camera_record(&flat);
+        render.job.samples.tile_mask = render.job.tile_mask(render.integrator, &flat, &camera);
+        laps.lap("prepare");
+
+        // auxiliary outputs and denoiser first, because intermediate images contain them, too
         let aov_start = Instant::now();
-        let pixels = match wanted.is_empty() && !extras.aov {
-            true => Vec::new(),
-            false => aov::render(tracer, &record, size, control)?,
-        };
+        let pixels = render.trace_aov(tracer, &camera, control)?;
         let aov_seconds = aov_start.elapsed().as_secs_f64();
         laps.lap("aov");
-        let denoise_options = integrator.denoise_options(&job)?;
+        let denoise_options = render.integrator.denoise_options(&render.job)?;
         let denoising = denoiser.as_ref().zip(denoise_options.as_ref()).map(|(chosen, options)| {
-            Denoising::new(chosen, denoise::DenoiseInput { tracer, scene, camera: &record, options }, integrator.channels())
+            let input = denoise::DenoiseInput { tracer, scene: flat.scene, camera: &camera, options };
+            Denoising::new(chosen, input, render.integrator.channels())
         });
-        let composer = Composer {
-            name: files::portable_name(&self.name),
-            camera,
-            integrator,
-            size,
-            pixels: &pixels,
-            aov: wanted,
-            origin: flat.origin,
-            identity: &identity,
-            maker: &maker,
-            target_rmse: settings.film.target_rmse,
-            chosen: chosen.as_deref(),
-            denoising: denoising.as_ref(),
-        };
-        let picture = settings.picture.options();
-        let mut interval_control = IntervalControl {
-            control: &mut *control,
-            save: &mut |accumulated, control| {
-                let image = composer.image(accumulated, control)?;
-                save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
-            },
-        };
-        let rendered = integrator.render(tracer, &flat, &job, tile_mask, &mut interval_control)?;
-        device.check_validation()?;
+
+        // the samples, and the image of them
+        let composer = Composer { render: &render, pixels: &pixels, origin: flat.origin, denoising: denoising.as_ref() };
+        let rendered = render.trace(tracer, &flat, &composer, control, save)?;
         laps.lap("trace");
-        let image = composer.image(&rendered.image, control)?;
+        let image = composer.compose(&rendered.image, control)?;
         laps.lap(if denoising.is_some() { "denoise" } else { "film" });
-        device.check_validation()?;
-        let mut rays = rendered.kept_rays;
+        self.device.check_validation()?;
+        let Rendered { image: accumulated, report: details, kept_rays: mut rays } = rendered;
         for rays in &mut rays {
             // to world space, as exported meshes are
             crate::ray::translate(rays, flat.origin);
         }
-        let surface_mean = brightness::of_surfaces(&rendered.image, integrator.channels().len());
-        let brightness =
-            surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), f64::from(picture.exposure)));
-        rendered.report.warnings.iter().for_each(|w| control.warning(w));
-        brightness.iter().for_each(|w| control.brightness(w));
-        warnings.extend(rendered.report.warnings.iter().chain(&brightness).cloned());
-        let (mean, mean_standard_error) = rendered.image.film.mean_and_error();
-        let mut report = StillReport {
-            setup: Setup::new(self, tracer, &flat, camera, (choices.clone(), chosen.clone()), warnings),
-            integrator: integrator.name(),
-            quantity: integrator.quantity(),
-            size,
-            spp: rendered.image.spp,
-            most_spp: rendered.image.max_spp,
-            requested_spp: job.spp,
-            seed: job.seed,
-            stopped_early: rendered.image.stopped_early,
-            mean,
-            mean_standard_error,
-            surface_mean,
-            film: FilmReport::new(&settings.film, &scene.hints, &rendered.image, samples_before, job.spp),
-            compute: tracer.compute_options(),
-            coherent_kernel: tracer.compute_options().map(|o| o.kernel.for_coherent(&device.info)),
-            primary_rays: rendered.image.primary_rays,
-            skipped_primary_rays: rendered.image.skipped_primary_rays,
-            device_seconds: rendered.image.device_seconds.clone(),
-            longest_launch: rendered.image.longest_launch,
-            details: rendered.report,
-            denoise: denoising.as_ref().map(Denoising::report),
-            seconds: Seconds {
-                trace: rendered.image.trace_seconds,
-                aov: aov_seconds,
-                render: start.elapsed().as_secs_f64(),
-                ..Seconds::default()
-            },
-        };
+
+        // what there is to say about it
+        let (integrator, picture) = (render.integrator, completed.settings.picture.options());
+        let mut report = render.report(tracer, &flat, &accumulated, details, control);
+        report.denoise = denoising.as_ref().map(Denoising::report);
+        report.seconds.aov = aov_seconds;
+        report.seconds.render = start.elapsed().as_secs_f64();
         drop(denoising);
+
+        // what later images can use
         self.tracer = Some(ready);
         self.keep_pipelines();
         laps.lap("film");
         report.seconds.parts = laps.into_parts();
         Ok(Still { image, aov: pixels, rays, report, integrator, picture })
+    }
+}
+
+/// A still in progress: what its steps have in common.
+struct StillRender<'a> {
+    renderer: &'a Renderer,
+    completed: &'a Completed,
+    extras: StillExtras,
+    integrator: &'static dyn Integrator,
+    job: RenderJob<'a>,
+    identity: Identity,
+    rendered_by: RenderedBy,
+    /// Options that the scene decided, as text.
+    chosen: Option<String>,
+    /// Samples per pixel of the image that is resumed.
+    samples_before: Option<u32>,
+    warnings: Vec<String>,
+}
+
+impl<'a> StillRender<'a> {
+    fn new(renderer: &'a Renderer, completed: &'a Completed, extras: StillExtras) -> Self {
+        let Completed { camera, settings, .. } = completed;
+        let (scene, info) = (&renderer.scene, &renderer.device.info);
+        let integrator = settings.integrator().get();
+        let mut job = settings.job(scene, camera);
+        job.samples.keep_rays = extras.keep_rays;
+        let fingerprint = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
+        Self {
+            renderer,
+            completed,
+            extras,
+            integrator,
+            identity: identity(integrator, &job, fingerprint),
+            job,
+            rendered_by: [("tracer", renderer.kind.name().into()), ("device", format!("{} ({})", info.name, info.driver))],
+            chosen: completed.options(),
+            samples_before: None,
+            warnings: scene_warnings(scene),
+        }
+    }
+
+    /// Reads the film that is resumed, if any, and says when the film is saved.
+    fn resume(&mut self, control: &mut dyn Control) -> Result<()> {
+        let (settings, job) = (&self.completed.settings, &mut self.job);
+        let (name, channels) = (&self.renderer.name, self.integrator.channels());
+        let resume = |path| {
+            film_file::resume(path, name, channels, job.samples.size, job.samples.spp, &self.identity, &self.rendered_by)
+        };
+        let resumed = settings.film.resume.as_deref().map(resume).transpose()?;
+        self.samples_before = resumed.as_ref().map(|r| r.state.max_samples());
+        if let Some(warning) = resumed.as_ref().and_then(|r| r.warning.clone()) {
+            control.warning(&warning);
+            self.warnings.push(warning);
+        }
+        job.samples.film = FilmOptions {
+            start: resumed.map(|r| r.state.into()),
+            keep_state: settings.film.keeps_state(),
+            intervals: stops(settings, self.extras, &job.scene.hints, job.samples.spp),
+            target_rmse: settings.film.target_rmse,
+        };
+        Ok(())
+    }
+
+    /// Builds the tracer, unless the one at hand has the same scene data.
+    fn build(
+        &mut self,
+        ready: Option<ReadyTracer>,
+        flat: &FlatScene,
+        is_denoised: bool,
+        control: &mut dyn Control,
+    ) -> Result<ReadyTracer> {
+        let Renderer { device, kind, compute, settings: device_settings, .. } = self.renderer;
+        let settings = &self.completed.settings;
+        let needs = aov_needs(self.integrator.needs(&settings.integrators), &settings.image.aov);
+        let request = TracerRequest {
+            // the normals that tell surfaces apart
+            needs: Needs { normals: needs.normals || is_denoised, ..needs },
+            streams: self.integrator.streams(&settings.integrators),
+            rays: self.integrator.rays_per_sample() * self.job.samples.count(),
+            control,
+            warnings: &mut self.warnings,
+        };
+        request.reuse_or_build(ready, device, *kind, flat, *compute, device_settings)
+    }
+
+    /// Traces auxiliary outputs, if any are wanted.
+    fn trace_aov(&self, tracer: &Tracer, camera: &CameraRecord, control: &mut dyn Control) -> Result<Vec<AovPixel>> {
+        if self.completed.settings.image.aov.is_empty() && !self.extras.aov {
+            return Ok(Vec::new());
+        }
+        aov::render(tracer, camera, self.job.samples.size, control)
+    }
+
+    /// Traces all samples; `save` receives intermediate images.
+    fn trace(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        composer: &Composer,
+        control: &mut dyn Control,
+        save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
+    ) -> Result<Rendered> {
+        let (integrator, picture) = (self.integrator, self.completed.settings.picture.options());
+        let mut interval_control = IntervalControl {
+            control,
+            save: &mut |accumulated, control| {
+                let image = composer.compose(accumulated, control)?;
+                save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
+            },
+        };
+        let rendered = integrator.render(tracer, flat, &self.job, &mut interval_control)?;
+        self.renderer.device.check_validation()?;
+        Ok(rendered)
+    }
+
+    /// Writes the report, and hands the warnings about the image to `control`.
+    fn report(
+        mut self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        image: &Accumulated,
+        details: IntegratorReport,
+        control: &mut dyn Control,
+    ) -> StillReport {
+        let Completed { camera, settings, choices, .. } = self.completed;
+        let (integrator, job) = (self.integrator, &self.job);
+
+        // warnings, of which those about brightness can be switched off
+        let surface_mean = brightness::of_surfaces(image, integrator.channels().len());
+        let exposure = f64::from(settings.picture.options().exposure);
+        let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
+        details.warnings.iter().for_each(|w| control.warning(w));
+        brightness.iter().for_each(|w| control.brightness(w));
+        self.warnings.extend(details.warnings.iter().chain(&brightness).cloned());
+
+        let (mean, mean_standard_error) = image.film.mean_and_error();
+        let compute = tracer.compute_options();
+        let choices = (choices.clone(), self.chosen);
+        StillReport {
+            setup: Setup::new(self.renderer, tracer, flat, camera, choices, self.warnings),
+            integrator: integrator.name(),
+            quantity: integrator.quantity(),
+            size: job.samples.size,
+            spp: image.spp,
+            most_spp: image.max_spp,
+            requested_spp: job.samples.spp,
+            seed: job.samples.seed,
+            stopped_early: image.stopped_early,
+            mean,
+            mean_standard_error,
+            surface_mean,
+            film: FilmReport::new(&settings.film, &job.scene.hints, image, self.samples_before, job.samples.spp),
+            compute,
+            coherent_kernel: compute.map(|o| o.kernel.for_coherent(&self.renderer.device.info)),
+            primary_rays: image.primary_rays,
+            skipped_primary_rays: image.skipped_primary_rays,
+            device_seconds: image.device_seconds.clone(),
+            longest_launch: image.longest_launch,
+            details,
+            denoise: None,
+            seconds: Seconds { trace: image.trace_seconds, ..Seconds::default() },
+        }
     }
 }
 
@@ -309,18 +389,18 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
-/// Everything that must agree for a render to be resumed: all that its samples depend on, except its size. `print`: the scene's fingerprint, if the film's state
-/// is kept.
-pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>) -> Identity {
-    let environment = || fingerprint::of_environment(&job.scene.environment);
-    let around = print.as_ref().filter(|_| integrator.sees_environment()).map(|_| environment());
+/// Everything that must agree for a render to be resumed: all that its samples depend on, except
+/// its size. `scene`: the scene's fingerprint, if the film's state is kept.
+pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Option<String>) -> Identity {
+    let has_environment = scene.is_some() && integrator.sees_environment();
+    let environment = has_environment.then(|| fingerprint::of_environment(&job.scene.environment));
     let mut out = vec![
         ("version", Some(env!("CARGO_PKG_VERSION").into())),
         ("integrator", Some(integrator.name().to_owned())),
-        ("scene.hash", print),
-        ("environment.hash", around),
+        ("scene.hash", scene),
+        ("environment.hash", environment),
         ("camera", Some(camera_text(job.camera))),
-        ("seed", Some(job.seed.to_string())),
+        ("seed", Some(job.samples.seed.to_string())),
     ];
     out.extend(integrator.identity(job));
     out
@@ -361,35 +441,31 @@ pub(super) fn spp_text(least: u32, most: u32) -> String {
 
 /// Composes images from films.
 struct Composer<'a> {
-    name: String,
-    camera: &'a Camera,
-    integrator: &'static dyn Integrator,
-    size: [u32; 2],
+    render: &'a StillRender<'a>,
+    /// Auxiliary outputs.
     pixels: &'a [AovPixel],
-    aov: &'a [Aov],
     origin: DVec3,
-    identity: &'a Identity,
-    maker: &'a Maker,
-    target_rmse: Option<f64>,
-    chosen: Option<&'a str>,
     denoising: Option<&'a Denoising<'a>>,
 }
 
 impl Composer<'_> {
-    fn image(&self, accumulated: &Accumulated, control: &mut dyn Control) -> Result<Image> {
+    /// Composes the image of a film: its channels, denoised where that is wanted, auxiliary outputs
+    /// and metadata.
+    fn compose(&self, accumulated: &Accumulated, control: &mut dyn Control) -> Result<Image> {
         let mut channels = self.channels(accumulated);
         let mut metadata = self.metadata(accumulated);
         if let Some(denoising) = self.denoising {
             channels = denoising.channels(accumulated, channels, control)?;
             metadata.push(("denoise".into(), denoising.name().into()));
         }
-        channels.extend(aov::channels(self.aov, self.pixels, self.origin));
-        Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
+        channels.extend(aov::channels(&self.render.completed.settings.image.aov, self.pixels, self.origin));
+        let [width, height] = self.render.job.samples.size;
+        Ok(Image { width, height, channels, metadata })
     }
 
     /// The film as named channels: means, coverage, the variance of one sample of each channel, and the film's sums if its state is kept.
     fn channels(&self, image: &Accumulated) -> Vec<Channel> {
-        let (film, names) = (&image.film, self.integrator.channels());
+        let (film, names) = (&image.film, self.render.integrator.channels());
         let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
         let mut out: Vec<_> = names.iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
         out.push(f32s("A".into(), film.coverage.clone()));
@@ -405,15 +481,15 @@ impl Composer<'_> {
 
     /// Text attributes. They are identical for two runs of the same command.
     fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
-        let mut out = vec![("scene", self.name.clone()), ("spp", spp_text(image.spp, image.max_spp))];
-        let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
-        out.extend(camera_numbers::metadata(self.camera, aspect));
-        out.extend(self.maker.iter().cloned());
-        out.extend(self.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
-        if let Some(target) = self.target_rmse {
+        let StillRender { renderer, completed, job, .. } = self.render;
+        let mut out = vec![("scene", files::portable_name(&renderer.name)), ("spp", spp_text(image.spp, image.max_spp))];
+        out.extend(camera_numbers::metadata(job.camera, job.aspect()));
+        out.extend(self.render.rendered_by.iter().cloned());
+        out.extend(self.render.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
+        if let Some(target) = completed.settings.film.target_rmse {
             out.push(("target_rmse", target.to_string()));
         }
-        out.extend(self.chosen.map(|options| (CHOSEN, options.to_owned())));
+        out.extend(self.render.chosen.clone().map(|options| (CHOSEN, options)));
         out.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
     }
 }

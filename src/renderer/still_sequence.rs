@@ -110,7 +110,10 @@ impl StillSequence<'_> {
             None => !image.metadata.iter().any(|(k, _)| k == key) || key.ends_with(".hash"),
         });
         let scene = crate::files::portable_name(&self.renderer.name);
-        Ok(same && has("spp", &job.spp.to_string()) && has("scene", &scene) && [image.width, image.height] == self.size())
+        Ok(same
+            && has("spp", &job.samples.spp.to_string())
+            && has("scene", &scene)
+            && [image.width, image.height] == self.size())
     }
 
     /// Renders the still of a frame. Animations loop.
@@ -118,9 +121,9 @@ impl StillSequence<'_> {
     /// # Errors
     /// Those of [`Renderer::still`].
     pub fn render(&mut self, number: u32, control: &mut dyn Control) -> Result<Still> {
-        let begun = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
+        let started = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
         self.completed.camera = self.pose(number)?;
-        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), begun, control, &mut |_| Ok(()))?;
+        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), started, control, &mut |_| Ok(()))?;
         still.image.metadata.push(("frame".into(), number.to_string()));
         still.image.metadata.sort();
         Ok(still)

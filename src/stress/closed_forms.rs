@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, Film};
 use crate::integrators::ao::{self, AoOptions, AoResult};
@@ -56,7 +57,7 @@ impl Case<'_> {
         // three-point Gauss-Legendre on [0, 1]
         let r = 0.5 * 0.6f64.sqrt();
         let nodes = [(0.5 - r, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + r, 5.0 / 18.0)];
-        let size = self.options.size;
+        let size = self.options.samples.size;
         let at = |x: f64, y: f64| (self.surface)(&camera_ray(&self.camera, DVec3::ZERO, size, [x, y]));
         (0..size[0] * size[1])
             .map(|i| {
@@ -125,13 +126,13 @@ pub fn render(
     options: &AoOptions,
     control: &mut dyn Control,
 ) -> Result<AoResult> {
-    let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+    let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     ao::render(tracer, &CameraRecord::new(camera, scene.origin(), aspect), options, control)
 }
 
 /// Options of a square image.
 pub fn options(size: u32, spp: u32, falloff: f64, radius: f64) -> AoOptions {
-    AoOptions { size: [size, size], spp, seed: 1, falloff, radius, ..Default::default() }
+    AoOptions { samples: SampleSettings::new([size, size], spp, 1), falloff, radius, ..Default::default() }
 }
 
 /// Where a ray meets the plane through `point` with unit normal `normal`, seen from its front.

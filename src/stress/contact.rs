@@ -7,7 +7,6 @@ use super::degenerate::{judge, parity_check, ray, scene_of, triangles, truth};
 use super::{Check, Section, Session};
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::integrators::ao::AoOptions;
 use crate::integrators::rays::{Mode, trace};
 use crate::oracle::Oracle;
 use crate::ray::Ray;
@@ -115,7 +114,7 @@ pub fn slack(
     multiply: f64,
     control: &mut dyn Control,
 ) -> Result<Slack> {
-    let options = AoOptions { keep_rays: true, ..options(48, 1, 1.0, f64::INFINITY) };
+    let options = options(48, 1, 1.0, f64::INFINITY).with_samples(|s| s.keep_rays = true);
     let image = closed_forms::render(tracer, scene, &scene.cameras[0], &options, control)?;
     let rays = image.kept_occlusion;
     if rays.is_empty() {
@@ -194,7 +193,7 @@ fn bridged(
     let mut sheet = both.instances[0].clone();
     sheet.object_to_world = DAffine3::from_translation(normal * gap) * sheet.object_to_world;
     both.instances.push(sheet);
-    let options = AoOptions { keep_rays: true, ..options(48, 1, 1.0, f64::INFINITY) };
+    let options = options(48, 1, 1.0, f64::INFINITY).with_samples(|s| s.keep_rays = true);
     // between the plane and the sheet, which is in the way of the camera
     let tracer = setup.tracer(kind, scene)?;
     let rays = closed_forms::render(&tracer, scene, &scene.cameras[0], &options, control)?.kept_occlusion;

@@ -10,6 +10,7 @@ use super::sampling::{not_finite, render};
 use super::{Check, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::film::state::{FilmState, words};
@@ -38,8 +39,8 @@ pub fn film_after(size: [u32; 2], samples: u32, radiance: [f32; 3]) -> Option<Fi
 }
 
 fn go_on(options: &PathOptions, from: FilmState, spp: u32) -> PathOptions {
-    let film = FilmOptions { start: Some(Arc::new(from)), keep_state: true, ..options.film.clone() };
-    PathOptions { spp, film, ..options.clone() }
+    let film = FilmOptions { start: Some(Arc::new(from)), keep_state: true, ..options.samples.film.clone() };
+    options.clone().with_samples(|s| (s.spp, s.film) = (spp, film))
 }
 
 /// Pixels of the film of [`film_drift`].
@@ -52,7 +53,7 @@ pub const SIZE: [u32; 2] = [8, 8];
 pub fn film_drift(setup: &Setup, kind: TracerKind, film: Option<FilmState>, last: u32, watch: &mut Watch) -> Result<f64> {
     let scene = constant();
     let flat = FlatScene::new(&scene);
-    let options = PathOptions { size: SIZE, max_depth: 0, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new(SIZE, 16, 0), max_depth: 0, ..Default::default() };
     let state = film.ok_or_else(|| Error::CheckFailed("no such film".into()))?;
     let image = render(&super::scale::path_tracer(setup, kind, &flat)?, &flat, &go_on(&options, state, last), watch)?.image;
     let counted = image.film.samples.iter().all(|&n| n == last);
@@ -99,9 +100,9 @@ impl Sampled {
 pub fn samples(setup: &Setup, kind: TracerKind, first: u32, count: u32, watch: &mut Watch) -> Result<Sampled> {
     let scene = builtin::by_name("cornell-box").ok_or_else(|| Error::Scene("no Cornell box".into()))?;
     let flat = FlatScene::new(&scene);
-    let options = PathOptions { size: [16, 16], max_depth: 2, seed: 3, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([16, 16], 16, 3), max_depth: 2, ..Default::default() };
     // so many samples of nothing: what is added to them is what is seen
-    let none = film_after(options.size, first, [0.0; 3]).ok_or_else(|| Error::CheckFailed("no such film".into()))?;
+    let none = film_after(options.samples.size, first, [0.0; 3]).ok_or_else(|| Error::CheckFailed("no such film".into()))?;
     let tracer = super::scale::path_tracer(setup, kind, &flat)?;
     let image = render(&tracer, &flat, &go_on(&options, none, first + count), watch)?.image;
     let state = image.state.ok_or_else(|| Error::CheckFailed("the film's sums were not kept".into()))?;

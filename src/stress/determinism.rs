@@ -10,6 +10,7 @@ use super::sampling;
 use super::{Check, Section, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::SampleSettings;
 use crate::integrators::path::PathOptions;
 use crate::output::{self, Image};
 use crate::scene::{Scene, builtin};
@@ -65,7 +66,7 @@ fn run(session: &mut Session) -> Result<()> {
     session.measure_each(name, &shading, |s, kind, w| {
         let cornell = scene("cornell-box")?;
         let flat = FlatScene::for_paths(&cornell);
-        let options = PathOptions { size: [32, 32], spp: 4, seed: 3, max_depth: 3, ..Default::default() };
+        let options = PathOptions { samples: SampleSettings::new([32, 32], 4, 3), max_depth: 3, ..Default::default() };
         let image = |w: &mut Watch| -> Result<Vec<f32>> {
             Ok(sampling::render(&super::scale::path_tracer(s, kind, &flat)?, &flat, &options, w)?.image.film.mean)
         };
@@ -92,15 +93,15 @@ fn run(session: &mut Session) -> Result<()> {
 fn masked_tiles(setup: &Setup, kind: crate::tracer::TracerKind, name: &str, scene: &Scene, watch: &mut Watch) -> Result<Check> {
     use crate::film::camera::CameraRecord;
     use crate::film::tile_mask::TileMask;
-    use crate::integrators::ao::{self, AoOptions};
+    use crate::integrators::ao;
     let flat = FlatScene::new(scene);
     let tracer = setup.tracer(kind, scene)?;
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
     let whole = options(72, 3, 1.0, 2.0);
     let all = ao::render(&tracer, &record, &whole, watch)?.image.film.mean;
-    let tile_mask = TileMask::new(&flat, &record, whole.size, whole.spp).map(std::sync::Arc::new);
+    let tile_mask = TileMask::new(&flat, &record, whole.samples.size, whole.samples.spp).map(std::sync::Arc::new);
     let masked = tile_mask.is_some();
-    let some = ao::render(&tracer, &record, &AoOptions { tile_mask, ..whole }, watch)?.image.film.mean;
+    let some = ao::render(&tracer, &record, &whole.with_samples(|s| s.tile_mask = tile_mask), watch)?.image.film.mean;
     let how = if masked { "some tiles were left out" } else { "no tile could be left out" };
     Ok(Check::at_most(name, different_bits(&all, &some) as f64, "pixels", 0.0).says(format!("of {} differ; {how}", all.len())))
 }

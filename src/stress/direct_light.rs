@@ -8,6 +8,7 @@ use super::sampling;
 use super::scale::{linear_maps, load_text, through};
 use super::{Session, Watch};
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::integrators::path::PathOptions;
 use crate::oracle::closed_form::polygon_form_factor;
 use crate::scene::builtin::shapes;
@@ -185,7 +186,7 @@ fn placed_maps() -> Vec<(&'static str, DMat3)> {
 
 fn measure(session: &mut Session, name: &str, expected: f64, scene: impl Fn(&mut Watch) -> Result<Scene>) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    let options = PathOptions { size: [16, 16], spp: effort.pick(16, 1024), seed: 5, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([16, 16], effort.pick(16, 1024), 5), ..Default::default() };
     session
         .measure_each(name, &kinds, |s, kind, w| sampling::check_mean(s, kind, name, &scene(w)?, &options, expected, 2e-6, w))
 }

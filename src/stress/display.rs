@@ -8,6 +8,7 @@ use super::{Check, Section, Session};
 use crate::accel::flatten::FlatScene;
 use crate::colour::{srgb_byte, srgb_decode, srgb_encode};
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::integrators::path::PathOptions;
 use crate::output::tone_map::ToneMap;
 use crate::realtime::{Filter, FilterKind, Preset, Settings};
@@ -121,7 +122,7 @@ fn extremes(session: &mut Session) -> Result<()> {
         scene.meshes[0].geometry = shapes::rectangle(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 40.0);
         session.measure_each(&name, &kinds, |s, kind, w| {
             let flat = FlatScene::for_paths(&scene);
-            let options = PathOptions { size: [8, 8], spp: 16, ..Default::default() };
+            let options = PathOptions { samples: SampleSettings::new([8, 8], 16, 0), ..Default::default() };
             let film = sampling::render(&super::scale::path_tracer(s, kind, &flat)?, &flat, &options, w)?.image.film;
             let off = film.mean.iter().map(|m| (f64::from(*m) / f64::from(radiance) - 1.0).abs()).fold(0.0, f64::max);
             let lost = sampling::not_finite(&film);

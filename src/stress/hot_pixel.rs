@@ -12,6 +12,7 @@ use crate::accel::flatten::FlatScene;
 use crate::denoise::{self, DenoiseInput, Denoiser, Features};
 use crate::error::Result;
 use crate::film::Film;
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::PathOptions;
 use crate::interface::records::denoise::NLMEANS_RADIUS;
@@ -185,7 +186,7 @@ fn filtered(setup: &Setup, kind: TracerKind, filter: FilterKind, film: &Film, wa
     let flat = FlatScene::for_paths(&scene);
     let tracer = super::scale::path_tracer(setup, kind, &flat)?;
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
-    let options = PathOptions { size: [SIZE, SIZE], ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([SIZE, SIZE], 16, 0), ..Default::default() };
     let shot = DenoiseInput { tracer: &tracer, scene: &scene, camera: &record, options: &options };
     let features = Features::render(&shot, watch)?;
     let settings = denoise::Settings { kind: filter, ..Default::default() };
@@ -241,7 +242,7 @@ pub fn frames_of(
     let size = [48, 27];
     let flat = FlatScene::for_paths(scene);
     let tracer = super::scale::path_tracer(setup, kind, &flat)?;
-    let options = PathOptions { size, max_depth: 1, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new(size, 16, 0), max_depth: 1, ..Default::default() };
     let mut realtime = Realtime::radiance(&tracer, &flat, size, settings, &options)?;
     let spot = scene.lights[0].position - flat.origin;
     let footprint: f64 = 2.0 * 10.0 * 0.3f64.tan() / f64::from(size[1]);

@@ -8,6 +8,7 @@ use super::sampling::{matte, render, scene_of};
 use super::{Check, Section, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::SampleSettings;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
@@ -43,8 +44,8 @@ pub fn constant() -> Scene {
 }
 
 fn up_to(options: &PathOptions, spp: u32, start: Option<FilmState>) -> PathOptions {
-    let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..options.film.clone() };
-    PathOptions { spp, film, ..options.clone() }
+    let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..options.samples.film.clone() };
+    options.clone().with_samples(|s| (s.spp, s.film) = (spp, film))
 }
 
 /// Largest relative distance of a film of [`constant`] from the radiance that it saw, and the same of a plain f32 sum.
@@ -137,7 +138,7 @@ fn run(session: &mut Session) -> Result<()> {
     session.measure_each(&name, &shading, |s, kind, w| {
         let scene = constant();
         let flat = FlatScene::new(&scene);
-        let options = PathOptions { size: [8, 8], max_depth: 0, ..Default::default() };
+        let options = PathOptions { samples: SampleSettings::new([8, 8], 16, 0), max_depth: 0, ..Default::default() };
         let image = render(&super::scale::path_tracer(s, kind, &flat)?, &flat, &up_to(&options, samples, None), w)?.image;
         let (worst, naive) = drift(&image);
         Ok(Check::at_most(name.as_str(), worst, "relative", DRIFT).says(format!("a plain f32 sum is off by {naive:.1e}")))
@@ -189,7 +190,7 @@ fn resumed(setup: &Setup, kind: TracerKind, stops: u32, watch: &mut Watch) -> Re
     let scene = builtin::by_name("cornell-box").ok_or_else(|| Error::Scene("no Cornell box".into()))?;
     let flat = FlatScene::new(&scene);
     let tracer = super::scale::path_tracer(setup, kind, &flat)?;
-    let options = PathOptions { size: [13, 11], seed: 3, max_depth: 3, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([13, 11], 16, 3), max_depth: 3, ..Default::default() };
     let whole = render(&tracer, &flat, &up_to(&options, 2 * stops, None), watch)?.image.state;
     let mut state = None;
     for k in 1..=stops {

@@ -9,6 +9,7 @@ use super::{Check, Effort, Section, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Film;
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{self, PathOptions, PathResult};
 use crate::oracle::camera::camera_ray;
@@ -80,7 +81,7 @@ pub fn mean_of(film: &Film) -> (f64, f64) {
 /// # Errors
 /// Those of rendering.
 pub fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, watch: &mut Watch) -> Result<PathResult> {
-    let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+    let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     path::render(tracer, flat, &CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect), options, watch)
 }
 
@@ -159,7 +160,7 @@ pub fn smooth_plastic_furnace(size: u32) -> f64 {
 
 fn run(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    let options = |spp: u32| PathOptions { size: [16, 16], spp, seed: 3, ..Default::default() };
+    let options = |spp: u32| PathOptions { samples: SampleSettings::new([16, 16], spp, 3), ..Default::default() };
     let (few, many) = (effort.pick(16, 1024), effort.pick(64, 16_384));
     // what conserves energy
     let mirror = Material { kind: MaterialKind::Mirror, specular_color: Vec3::ONE, ..Material::default() };
@@ -223,7 +224,7 @@ fn environments(session: &mut Session, kinds: &[TracerKind], options: &PathOptio
             let flat = FlatScene::for_paths(&scene);
             let tracer = super::scale::path_tracer(s, kind, &flat)?;
             let film = render(&tracer, &flat, options, w)?.image.film;
-            let other = render(&tracer, &flat, &PathOptions { seed: 8, ..options.clone() }, w)?.image.film;
+            let other = render(&tracer, &flat, &options.clone().with_samples(|s| s.seed = 8), w)?.image.film;
             let ((a, e), (b, f)) = (mean_of(&film), mean_of(&other));
             let value = if not_finite(&film) + not_finite(&other) > 0 { f64::NAN } else { (a - b).abs() };
             let bound = ERRORS * e.hypot(f) + 2e-6 * a;

@@ -201,7 +201,7 @@ pub fn check_exact(setup: &Setup, kind: TracerKind, name: &str, scene: &Scene, w
     let options = options(setup.effort().pick(48, 192), setup.effort().pick(4, 64), 1.0, f64::INFINITY);
     let image = closed_forms::render(&setup.tracer(kind, scene)?, scene, &scene.cameras[0], &options, watch)?;
     let (covered, off) = closed_forms::samples_off(&image.image.film, image.image.spp, want);
-    let least = 0.25 * f64::from(options.size[0] * options.size[1] * options.spp);
+    let least = 0.25 * f64::from(options.samples.size[0] * options.samples.size[1] * options.samples.spp);
     let value = if covered < least { f64::NAN } else { off };
     let spare = if kind == TracerKind::Compute || want == 1.0 { 0.0 } else { (1e-5 * covered).ceil() };
     Ok(Check::at_most(name, value, "samples", spare).says(format!("of {covered}, that are not {want}")))

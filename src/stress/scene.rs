@@ -15,8 +15,8 @@ use super::sampling::{mean_of, not_finite, render};
 use super::{Check, Section, Session, Setup, Watch, number};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::SampleSettings;
 use crate::film::{Control, camera};
-use crate::integrators::ao::AoOptions;
 use crate::integrators::path::PathOptions;
 use crate::integrators::rays::{Mode, trace};
 use crate::measure::ray_sets::mixed_rays;
@@ -418,7 +418,7 @@ pub fn self_hits(
     size: u32,
     control: &mut dyn Control,
 ) -> Result<Option<(usize, usize)>> {
-    let options = AoOptions { keep_rays: true, ..options(size, 1, 1.0, f64::INFINITY) };
+    let options = options(size, 1, 1.0, f64::INFINITY).with_samples(|s| s.keep_rays = true);
     let image = closed_forms::render(tracer, scene, view, &options, control)?;
     let first = trace(tracer, &image.kept_primary, Mode::Closest, 1, control)?.0;
     let from: Vec<_> = first.iter().filter(|h| h.is_hit()).collect();
@@ -538,7 +538,11 @@ fn path_image(setup: &Setup, kind: TracerKind, name: &str, watch: &mut Watch) ->
     scene.cameras = vec![view];
     let flat = FlatScene::for_paths(&scene);
     let effort = setup.effort();
-    let options = PathOptions { size: [effort.pick(48, 256); 2], spp: effort.pick(4, 256), max_depth: 8, ..Default::default() };
+    let options = PathOptions {
+        samples: SampleSettings::new([effort.pick(48, 256); 2], effort.pick(4, 256), 0),
+        max_depth: 8,
+        ..Default::default()
+    };
     let film = render(&super::scale::path_tracer(setup, kind, &flat)?, &flat, &options, watch)?.image.film;
     let (mean, error) = mean_of(&film);
     let light = if is_dark { ", in a white sky, as it has no light" } else { "" };

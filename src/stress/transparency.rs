@@ -6,6 +6,7 @@ use super::degenerate::{judge, parity_check, ray, truth};
 use super::sampling::{add, check_mean, furnace, glass, matte, scene_of};
 use super::{Check, Section, Session};
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::film::{Control, camera};
 use crate::integrators::path::PathOptions;
 use crate::integrators::rays::{Mode, trace};
@@ -115,7 +116,7 @@ fn run(session: &mut Session) -> Result<()> {
 
 fn glasses(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    let options = PathOptions { size: [16, 16], spp: effort.pick(64, 16_384), seed: 3, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([16, 16], effort.pick(64, 16_384), 3), ..Default::default() };
     let mut cases = Vec::new();
     // a camera within glass, and one that looks along a rod in which light is reflected totally
     let mut within = furnace(1.0, glass(0.0, 1.5));

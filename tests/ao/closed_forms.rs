@@ -344,7 +344,7 @@ fn check_exact(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera,
         let (covered, off) = closed_forms::samples_off(&image.image.film, image.image.spp, want);
         println!("{what} {kind}: {off} of {covered} samples are not {want}");
         assert!(
-            covered >= 0.25 * options.size[0] as f64 * options.size[1] as f64 * options.spp as f64,
+            covered >= 0.25 * options.samples.size[0] as f64 * options.samples.size[1] as f64 * options.samples.spp as f64,
             "{what} {kind}: {covered} covered"
         );
         assert!(off <= spare(kind) * 1e-6 * covered, "{what} {kind}: {off} of {covered} samples are not {want}");

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;
+use skylit::film::SampleSettings;
 use skylit::film::tile_mask::TileMask;
 use skylit::oracle::Oracle;
 use skylit::scene::builtin::{SceneTransform, analytic};
@@ -22,7 +23,7 @@ fn gpu_film_sums_are_compensated() {
     // a small floor: rays start above it by a few ulp of its size, and that much less is met
     let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default());
     let camera = Camera::look_at(DVec3::new(1.0, 0.2, 0.0), DVec3::ZERO, DVec3::Y, 0.02);
-    let options = AoOptions { size: [3, 2], spp: 20_000, falloff: 1.7, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([3, 2], 20_000, 0), falloff: 1.7, ..Default::default() };
     let oracle = Oracle::new(&scene, scene.origin());
     let want = oracle_image(&oracle, &camera, &options);
     for kind in tracers(&device) {
@@ -47,11 +48,11 @@ fn gpu_film_variance_and_seeds() {
     let device = device();
     let scene = scene("stairs");
     let camera = &scene.cameras[0];
-    let options = AoOptions { size: [64, 48], spp: 6, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([64, 48], 6, 0), ..Default::default() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let first = render(&tracer, &scene, camera, &options);
-        let (mut mixed, n) = (0, options.spp as f64);
+        let (mut mixed, n) = (0, options.samples.spp as f64);
         for (&m, &v) in first.image.film.mean.iter().zip(&first.image.film.variance) {
             let m = m as f64;
             assert!((v as f64 - n / (n - 1.0) * m * (1.0 - m)).abs() < 1e-6, "{kind}: mean {m}, variance {v}");
@@ -61,14 +62,14 @@ fn gpu_film_variance_and_seeds() {
         let again = render(&tracer, &scene, camera, &options);
         assert_eq!(first.image.film.mean, again.image.film.mean, "{kind}: the same seed, other bits");
         assert_eq!(first.image.film.variance, again.image.film.variance, "{kind}: the same seed, other bits");
-        let other = render(&tracer, &scene, camera, &AoOptions { seed: 1, ..options.clone() });
+        let other = render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.seed = 1));
         let (count, _, mean) = differences(&first.image.film.mean, &other.image.film.mean, 1e-3);
         let (_, error) = first.image.film.mean_and_error();
         println!("{kind}: another seed changes {count} pixels and the mean by {mean:+.1e}, standard error {error:.1e}");
         assert!(count > 500, "{kind}: another seed changes {count} pixels only");
         assert!(mean.abs() < 4.0 * 2f64.sqrt() * error, "{kind}: another seed changes the mean by {mean}");
         // a single sample has no variance, and is 0 or 1
-        let single = render(&tracer, &scene, camera, &AoOptions { spp: 1, ..options.clone() });
+        let single = render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.spp = 1));
         assert!(single.image.film.variance.iter().all(|&v| v == 0.0));
         assert!(single.image.film.mean.iter().all(|&m| m == 0.0 || m == 1.0));
     }
@@ -81,16 +82,16 @@ fn gpu_film_does_not_depend_on_batches() {
     let device = device();
     let scene = scene("leaf-cards");
     let camera = &scene.cameras[0];
-    let options = AoOptions { size: [70, 45], spp: 23, falloff: 3.0, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([70, 45], 23, 0), falloff: 3.0, ..Default::default() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         // 16 + 4 + 2 + 1 samples
         let whole = render(&tracer, &scene, camera, &options);
         // 1 + 16 + 4 + 2
-        let kept = render(&tracer, &scene, camera, &AoOptions { keep_rays: true, ..options.clone() });
+        let kept = render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.keep_rays = true));
         // 1 at a time at first, more later
         let paced =
-            render(&tracer, &scene, camera, &AoOptions { time_limit: Some(Duration::from_secs(3600)), ..options.clone() });
+            render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.time_limit = Some(Duration::from_secs(3600))));
         for other in [&kept, &paced] {
             assert_eq!(whole.image.film.mean, other.image.film.mean, "{kind}");
             assert_eq!(whole.image.film.variance, other.image.film.variance, "{kind}");
@@ -113,7 +114,7 @@ fn gpu_kernels_stop_at_the_end_of_the_queue() {
     let camera =
         [camera.clone(), far].into_iter().max_by_key(|c| (c.camera_to_world.translation.z.abs() * 1e6) as i64).unwrap();
     let flat = FlatScene::new(&scene);
-    let options = AoOptions { size: [96, 96], spp: 8, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([96, 96], 8, 0), ..Default::default() };
     let images: Vec<_> = [Kernel::Wide, Kernel::Nearest, Kernel::Direction, Kernel::Brute]
         .into_iter()
         .map(|kernel| {
@@ -160,13 +161,13 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
                 false => camera.clone(),
                 true => Camera { projection: Projection::Orthographic { half_height: 12.0 }, ..camera.clone() },
             };
-            let options = AoOptions { size, spp, ..Default::default() };
+            let options = AoOptions { samples: SampleSettings::new(size, spp, 0), ..Default::default() };
             let tile_mask = TileMask::new(&flat, &record(scene, &camera, size), size, spp).map(Arc::new);
             let (live, all) = tile_mask.as_ref().map_or((1, 1), |c| c.count());
             for kind in tracers(&device) {
                 let tracer = tracer(&device, kind, scene);
                 let whole = render(&tracer, scene, &camera, &options);
-                let image = render(&tracer, scene, &camera, &AoOptions { tile_mask: tile_mask.clone(), ..options.clone() });
+                let image = render(&tracer, scene, &camera, &options.clone().with_samples(|s| s.tile_mask = tile_mask.clone()));
                 assert_eq!(whole.image.film.mean, image.image.film.mean, "{name} {kind}");
                 assert_eq!(whole.image.film.coverage, image.image.film.coverage, "{name} {kind}");
                 assert_eq!(whole.image.film.samples, image.image.film.samples, "{name} {kind}");

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 use skylit::accel::flatten::FlatScene;
+use skylit::film::SampleSettings;
 use skylit::film::block::Block;
 use skylit::gpu::Device;
 use skylit::interface::PixelFilter;
@@ -32,7 +33,7 @@ fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: 
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
         let image = render(&tracer, scene, camera, options);
-        assert!(image.image.film.samples.iter().all(|&s| s == options.spp), "{what} {kind}: samples are missing");
+        assert!(image.image.film.samples.iter().all(|&s| s == options.samples.spp), "{what} {kind}: samples are missing");
         let (count, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, threshold);
         let (covers, ..) = differences(&image.image.film.coverage, &want.coverage, 1e-6);
         println!(
@@ -59,12 +60,12 @@ fn gpu_images_equal_the_oracles() {
     let device = device();
     for name in ["cornell-box", "stairs", "leaf-cards", "spheres:300", "grid:4", "far-away", "cornell-spheres"] {
         let scene = scene(name);
-        let options = AoOptions { size: [96, 72], spp: 8, seed: 3, ..Default::default() };
+        let options = AoOptions { samples: SampleSettings::new([96, 72], 8, 3), ..Default::default() };
         compare_with_oracle(&device, name, &scene, &scene.cameras[0], &options);
     }
     for (name, falloff, radius) in [("stairs", 8.0, f64::INFINITY), ("leaf-cards", 2.0, 0.6), ("spheres:300", 1.0, 0.5)] {
         let scene = scene(name);
-        let options = AoOptions { size: [96, 72], spp: 8, seed: 4, falloff, radius, ..Default::default() };
+        let options = AoOptions { samples: SampleSettings::new([96, 72], 8, 4), falloff, radius, ..Default::default() };
         let what = format!("{name}, falloff {falloff}, radius {radius}");
         compare_with_oracle(&device, &what, &scene, &scene.cameras[0], &options);
     }
@@ -77,7 +78,7 @@ fn gpu_images_of_any_size() {
     let scene = scene("cornell-box");
     for size in [[1, 1], [1, 2], [7, 3], [8, 8], [9, 17], [65, 33], [1, 300], [300, 1]] {
         for spp in [1, 3] {
-            let options = AoOptions { size, spp, ..Default::default() };
+            let options = AoOptions { samples: SampleSettings::new(size, spp, 0), ..Default::default() };
             compare_with_oracle(&device, &format!("{size:?} at {spp}"), &scene, &scene.cameras[0], &options);
         }
     }
@@ -92,7 +93,7 @@ fn gpu_clipped_images() {
         let scene = scene(name);
         let camera = &scene.cameras[0];
         let flat = Camera { projection: Projection::Orthographic { half_height: 2.0 }, ..camera.clone() };
-        let options = AoOptions { size: [48, 36], spp: 4, seed: 5, ..Default::default() };
+        let options = AoOptions { samples: SampleSettings::new([48, 36], 4, 5), ..Default::default() };
         let oracle = Oracle::new(&scene, scene.origin());
         let middle = oracle.closest(camera_ray(camera, scene.origin(), [1, 1], [0.5, 0.5])).t;
         assert!(middle.is_finite());
@@ -114,7 +115,7 @@ fn gpu_orthographic_images() {
     let scene = scene("stairs");
     let mut camera = scene.cameras[0].clone();
     camera.projection = Projection::Orthographic { half_height: 1.7 };
-    let options = AoOptions { size: [90, 60], spp: 8, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([90, 60], 8, 0), ..Default::default() };
     compare_with_oracle(&device, "stairs, orthographic", &scene, &camera, &options);
     assert_validation_clean(&device);
 }
@@ -127,20 +128,21 @@ fn gpu_images_of_several_blocks() {
     let scene = scene("cornell-box");
     let camera = &scene.cameras[0];
     let oracle = Oracle::new(&scene, scene.origin());
-    let options = AoOptions { size: [3000, 1000], spp: 1, seed: 11, ..Default::default() };
-    let blocks = Block::cut(options.size);
+    let options = AoOptions { samples: SampleSettings::new([3000, 1000], 1, 11), ..Default::default() };
+    let blocks = Block::cut(options.samples.size);
     assert!(blocks.len() > 1);
     let seam = blocks[1].origin[1];
     assert!(seam > 0 && blocks[1].origin[0] == 0);
-    let mut pixels: Vec<[u32; 2]> =
-        (0..4000).map(|i| [0, 1].map(|k| (to_unit(hash_combine(i, k)) * options.size[k as usize] as f32) as u32)).collect();
+    let mut pixels: Vec<[u32; 2]> = (0..4000)
+        .map(|i| [0, 1].map(|k| (to_unit(hash_combine(i, k)) * options.samples.size[k as usize] as f32) as u32))
+        .collect();
     pixels.extend((0..3000).step_by(5).flat_map(|x| [[x, seam - 1], [x, seam]]));
-    let sampler = Sampler { seed: options.seed };
+    let sampler = Sampler { seed: options.samples.seed };
     let want: Vec<f32> = pixels
         .par_iter()
         .map(|&pixel| {
             let u = sampler.get_2d_unit(pixel, 0, CAMERA_FILM);
-            let ray = camera_ray(camera, oracle.origin(), options.size, [0, 1].map(|k| pixel[k] as f64 + u[k] as f64));
+            let ray = camera_ray(camera, oracle.origin(), options.samples.size, [0, 1].map(|k| pixel[k] as f64 + u[k] as f64));
             let hit = oracle.closest(ray);
             if !hit.is_hit() {
                 return 0.0;
@@ -155,7 +157,8 @@ fn gpu_images_of_several_blocks() {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, camera, &options);
         assert!(image.image.film.samples.iter().all(|&s| s == 1), "{kind}: pixels without their sample");
-        let got: Vec<f32> = pixels.iter().map(|&[x, y]| image.image.film.mean[(y * options.size[0] + x) as usize]).collect();
+        let got: Vec<f32> =
+            pixels.iter().map(|&[x, y]| image.image.film.mean[(y * options.samples.size[0] + x) as usize]).collect();
         let (count, ..) = differences(&got, &want, 1e-4);
         println!(
             "{kind}: {count} of {} pixels differ; {} + {} rays, {} skipped, in {:.2} s; the longest launch took {:.3} s",
@@ -170,7 +173,7 @@ fn gpu_images_of_several_blocks() {
         assert_eq!(image.image.primary_rays, 3_000_000);
         assert_eq!(image.occlusion_rays + image.skipped_rays, 3_000_000);
         // no time at all: every block still gets one sample, or there would be no image
-        let hurried = AoOptions { spp: 4, time_limit: Some(Duration::ZERO), ..options.clone() };
+        let hurried = options.clone().with_samples(|s| (s.spp, s.time_limit) = (4, Some(Duration::ZERO)));
         let image = render(&tracer, &scene, camera, &hurried);
         assert!(
             image.image.stopped_early && image.image.spp == 1 && image.image.film.samples.iter().all(|&s| s == 1),
@@ -199,7 +202,8 @@ fn gpu_entry_points_miss_nothing() {
         let scene = scene(name);
         let mut camera = scene.cameras[0].clone();
         camera.projection = Projection::Perspective { fov_y: f64::to_radians(fov_y) };
-        let options = AoOptions { size, spp: 32, seed: 5, pixel_filter, ..Default::default() };
+        let options =
+            AoOptions { samples: SampleSettings { pixel_filter, ..SampleSettings::new(size, 32, 5) }, ..Default::default() };
         let flat = FlatScene::new(&scene);
         let [start, root] = [Kernel::Packet, Kernel::Wide].map(|kernel| {
             let tracer = Tracer::with_options(&device, TracerKind::Compute, &flat, Needs::default(), kernel).unwrap();

@@ -1,6 +1,7 @@
 //! Rays that a render keeps.
 
 use glam::DVec3;
+use skylit::film::SampleSettings;
 use skylit::film::block::Block;
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
@@ -16,12 +17,18 @@ fn gpu_kept_rays_are_the_images() {
     let scene = scene("stairs");
     let camera = &scene.cameras[0];
     let oracle = Oracle::new(&scene, scene.origin());
-    let options = AoOptions { size: [75, 50], spp: 2, seed: 5, radius: 1.25, keep_rays: true, ..Default::default() };
-    let sampler = Sampler { seed: options.seed };
-    let block = Block::cut(options.size)[0];
+    let options = AoOptions {
+        samples: SampleSettings { keep_rays: true, ..SampleSettings::new([75, 50], 2, 5) },
+        radius: 1.25,
+        ..Default::default()
+    };
+    let sampler = Sampler { seed: options.samples.seed };
+    let block = Block::cut(options.samples.size)[0];
     // in the order in which pixels are numbered
-    let pixels: Vec<[u32; 2]> =
-        (0..block.rays()).filter(|&k| block.image_index(k, options.size[0]).is_some()).map(|k| block.pixel(k)).collect();
+    let pixels: Vec<[u32; 2]> = (0..block.rays())
+        .filter(|&k| block.image_index(k, options.samples.size[0]).is_some())
+        .map(|k| block.pixel(k))
+        .collect();
     assert_eq!(pixels.len(), 75 * 50);
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
@@ -36,7 +43,7 @@ fn gpu_kept_rays_are_the_images() {
         for (ray, &pixel) in primary.iter().zip(&pixels) {
             let u = sampler.get_2d_unit(pixel, 0, CAMERA_FILM);
             let film = [0, 1].map(|k| pixel[k] as f64 + u[k] as f64);
-            let want = camera_ray(camera, oracle.origin(), options.size, film);
+            let want = camera_ray(camera, oracle.origin(), options.samples.size, film);
             assert!((wide(ray.origin) - want.origin).length() < 1e-6, "{kind}: {ray:?}, {want:?}");
             assert!((wide(ray.direction) - want.direction).length() < 1e-6, "{kind}: {ray:?}, {want:?}");
             assert!(ray.tmin == 0.0 && ray.tmax == f32::INFINITY, "{kind}: {ray:?}");
@@ -60,7 +67,7 @@ fn gpu_kept_rays_are_the_images() {
         assert_eq!(next, occlusion.len(), "{kind}");
         assert!(odd <= next / 1000, "{kind}: {odd} of {next} occlusion rays are not the oracle's");
         // those of the second sample are not among them, and they are not kept unless requested
-        let image = render(&tracer, &scene, camera, &AoOptions { keep_rays: false, ..options.clone() });
+        let image = render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.keep_rays = false));
         assert!(image.kept_primary.is_empty() && image.kept_occlusion.is_empty());
     }
     assert_validation_clean(&device);

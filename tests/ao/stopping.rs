@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use skylit::Error;
-use skylit::film::Control;
+use skylit::film::{Control, SampleSettings};
 use skylit::integrators::{ao, aov};
 
 use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
@@ -14,7 +14,10 @@ fn gpu_time_limit() {
     let device = device();
     let scene = scene("cornell-box");
     let limit = Duration::from_millis(400);
-    let options = AoOptions { size: [64, 64], spp: 1 << 24, time_limit: Some(limit), ..Default::default() };
+    let options = AoOptions {
+        samples: SampleSettings { time_limit: Some(limit), ..SampleSettings::new([64, 64], 1 << 24, 0) },
+        ..Default::default()
+    };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let start = Instant::now();
@@ -25,7 +28,7 @@ fn gpu_time_limit() {
             image.image.spp, image.image.longest_launch
         );
         assert!(
-            image.image.stopped_early && image.image.spp >= 1 && image.image.spp < options.spp,
+            image.image.stopped_early && image.image.spp >= 1 && image.image.spp < options.samples.spp,
             "{kind}: {}",
             image.image.spp
         );
@@ -62,7 +65,7 @@ fn gpu_interruption_and_progress() {
     let device = device();
     let scene = scene("cornell-box");
     let camera = record(&scene, &scene.cameras[0], [64, 64]);
-    let options = AoOptions { size: [64, 64], spp: 800, ..Default::default() };
+    let options = AoOptions { samples: SampleSettings::new([64, 64], 800, 0), ..Default::default() };
     let stopper = |questions, answer| Stopper { questions, answer, progress: Vec::new() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
@@ -76,13 +79,13 @@ fn gpu_interruption_and_progress() {
         let image = ao::render(&tracer, &camera, &options, &mut stopper(9, || Ok(true))).unwrap();
         println!("{kind}: stopped after {} samples", image.image.spp);
         assert!(image.image.stopped_early && image.image.spp >= 1 && image.image.spp < 800, "{kind}: {}", image.image.spp);
-        let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: image.image.spp, ..options.clone() });
+        let same = render(&tracer, &scene, &scene.cameras[0], &options.clone().with_samples(|s| s.spp = image.image.spp));
         assert_eq!(image.image.film.mean, same.image.film.mean, "{kind}: not the image of as many samples");
         assert!(!same.image.stopped_early);
         // in the midst of the first samples that are taken together: one is finished, or there would be no image
         let image = ao::render(&tracer, &camera, &options, &mut stopper(1, || Ok(true))).unwrap();
         assert!(image.image.stopped_early && image.image.spp == 1, "{kind}: {}", image.image.spp);
-        let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: 1, ..options.clone() });
+        let same = render(&tracer, &scene, &scene.cameras[0], &options.clone().with_samples(|s| s.spp = 1));
         assert_eq!(image.image.film.mean, same.image.film.mean, "{kind}: not the image of one sample");
         let mut control = stopper(u32::MAX, || Ok(false));
         let image = ao::render(&tracer, &camera, &options, &mut control).unwrap();

@@ -24,8 +24,8 @@ use common::{assert_validation_clean, tracers};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
 use skylit::accel::flatten::FlatScene;
-use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
+use skylit::film::{NoControl, SampleSettings};
 use skylit::gpu::{Device, Options};
 use skylit::integrators::path::{Lens, MAX_DEPTH, PathIntegrator, PathOptions};
 use skylit::measure::distributions::critical_value;
@@ -195,8 +195,7 @@ impl Entry {
         let n = 3 * (self.size[0] * self.size[1]) as usize;
         let (mut sums, mut squares, mut variances) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let options = PathOptions {
-            size: self.size,
-            spp: self.spp / BLOCKS,
+            samples: SampleSettings::new(self.size, self.spp / BLOCKS, 0),
             max_depth: self.max_depth.unwrap_or(MAX_DEPTH),
             lens: self.lens.as_ref().map(|l| Lens { radius: l.radius, focus: l.focus }),
             ..Default::default()
@@ -207,7 +206,7 @@ impl Entry {
             // scenes that look alike must not have the same noise
             let seed = self.name.bytes().fold(block, |h, b| h.wrapping_mul(31).wrapping_add(b.into()));
             let film = integrator
-                .render(&tracer, &camera, options.spp, seed, &mut NoControl)
+                .render(&tracer, &camera, options.samples.spp, seed, &mut NoControl)
                 .unwrap_or_else(|e| panic!("{}, {kind}: {e}", self.name));
             let film = film.image.film;
             assert_eq!(film.not_finite, 0, "{}, {kind}: samples that are no numbers", self.name);

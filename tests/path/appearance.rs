@@ -17,12 +17,19 @@ struct Seen<'a> {
 
 impl Seen<'_> {
     fn with(&self, max_depth: u32) -> Film {
-        render(&self.tracer, self.flat, &PathOptions { size: SIZE, spp: 64, max_depth, ..PathOptions::default() }).image.film
+        render(
+            &self.tracer,
+            self.flat,
+            &PathOptions { samples: SampleSettings::new(SIZE, 64, 0), max_depth, ..PathOptions::default() },
+        )
+        .image
+        .film
     }
 
     /// Pixels that show nothing but the mirrors.
     fn mirrors(&self) -> Vec<usize> {
-        let options = PathOptions { size: SIZE, spp: 64, view: Some(View::Albedo), ..PathOptions::default() };
+        let options =
+            PathOptions { samples: SampleSettings::new(SIZE, 64, 0), view: Some(View::Albedo), ..PathOptions::default() };
         let albedo = render(&self.tracer, self.flat, &options).image.film;
         let whole = |p: &[f32]| p.iter().all(|c| (c - MIRROR_ALBEDO).abs() < 1e-5);
         albedo.mean.chunks(3).enumerate().filter(|(_, p)| whole(p)).map(|(k, _)| k).collect()

@@ -42,9 +42,16 @@ fn gpu_filters_weigh_an_edge() {
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         for pixel_filter in [PixelFilter::Box, PixelFilter::Tent, PixelFilter::BlackmanHarris, PixelFilter::Centre] {
-            let options = PathOptions { size: [16, 16], spp: 256, max_depth: 0, pixel_filter, ..Default::default() };
+            let options = PathOptions {
+                samples: SampleSettings { pixel_filter, ..SampleSettings::new([16, 16], 256, 0) },
+                max_depth: 0,
+                ..Default::default()
+            };
             let film = render(&tracer, &flat, &options).image.film;
-            let options = AoOptions { size: [16, 16], spp: 256, pixel_filter, ..Default::default() };
+            let options = AoOptions {
+                samples: SampleSettings { pixel_filter, ..SampleSettings::new([16, 16], 256, 0) },
+                ..Default::default()
+            };
             let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
             let coverage = ao::render(&tracer, &record, &options, &mut NoControl).unwrap().image.film.coverage;
             for x in 0..16 {
@@ -75,7 +82,8 @@ fn gpu_a_lens_blurs_what_is_not_in_focus() {
         scene_of(vec![(square, Material { double_sided: true, ..emitter(1.0) })], camera)
     };
     let lens = Some(Lens { radius: radius as f32, focus: focus as f32 });
-    let options = PathOptions { size: [size as u32; 2], spp: 64, max_depth: 0, lens, ..Default::default() };
+    let options =
+        PathOptions { samples: SampleSettings::new([size as u32; 2], 64, 0), max_depth: 0, lens, ..Default::default() };
     for kind in picked(&device) {
         let image = |distance: f64, options: &PathOptions| {
             let scene = lamp(distance);

@@ -10,12 +10,12 @@ use skylit::scene::builtin::{by_name, shapes};
 const SIZE: [u32; 2] = [48, 48];
 
 fn options(spp: u32, seed: u32) -> PathOptions {
-    PathOptions { size: SIZE, spp, seed, ..Default::default() }
+    PathOptions { samples: SampleSettings::new(SIZE, spp, seed), ..Default::default() }
 }
 
 /// Filters a film that `options` rendered.
 fn filter(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, film: &Film) -> (Vec<f32>, Features) {
-    let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+    let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
     let shot = DenoiseInput { tracer, scene: flat.scene, camera: &record, options };
     let features = Features::render(&shot, &mut NoControl).unwrap();

@@ -15,7 +15,7 @@ fn floor_and(mut parts: Vec<(Geometry, Material)>) -> Scene {
 }
 
 fn options(strategy: Strategy, spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 5, strategy, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 5), strategy, ..Default::default() }
 }
 
 fn light(kind: LightKind, position: DVec3, direction: DVec3, intensity: f32) -> Light {
@@ -102,7 +102,7 @@ fn gpu_leds() {
     }
     let share = 0.5f64.powf(0.5f64.cos().ln() / 0.7f64.cos().ln());
     let expected = expected * 0.5 * (1.0 + share);
-    holds(&device, "many", &many, &PathOptions { spp: 1024, ..options }, expected, 1e-2);
+    holds(&device, "many", &many, &options.with_samples(|s| s.spp = 1024), expected, 1e-2);
 }
 
 /// A sphere seen under a half angle a from a point, its centre at angle t from the normal and all of it above the horizon: pi L sin^2 a cos t.

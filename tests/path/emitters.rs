@@ -9,7 +9,7 @@ use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
 const RHO: f64 = 0.6;
 
 fn options(strategy: Strategy, spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 5, strategy, max_depth: 1, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 5), strategy, max_depth: 1, ..Default::default() }
 }
 
 /// A floor, its middle seen from above through a view of 2e-3 units.

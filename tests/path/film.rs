@@ -22,8 +22,8 @@ impl Control for Intervals {
 
 /// With so many samples in all, from a film or from none, its sums kept.
 fn up_to(options: &PathOptions, spp: u32, start: Option<FilmState>) -> PathOptions {
-    let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..options.film.clone() };
-    PathOptions { spp, film, ..options.clone() }
+    let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..options.samples.film.clone() };
+    options.clone().with_samples(|s| (s.spp, s.film) = (spp, film))
 }
 
 fn same(what: &str, a: &Accumulated, b: &Accumulated) {
@@ -38,8 +38,8 @@ fn same(what: &str, a: &Accumulated, b: &Accumulated) {
 #[test]
 fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
     let device = device();
-    let box_ = PathOptions { size: [21, 19], spp: 16, seed: 3, max_depth: 4, ..Default::default() };
-    let sky = PathOptions { white_sky: Some(0.5), size: [16, 24], ..box_.clone() };
+    let box_ = PathOptions { samples: SampleSettings::new([21, 19], 16, 3), max_depth: 4, ..Default::default() };
+    let sky = PathOptions { white_sky: Some(0.5), ..box_.clone().with_samples(|s| s.size = [16, 24]) };
     for (name, options) in [("cornell-box", box_), ("stairs", sky)] {
         let scene = by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
@@ -70,7 +70,7 @@ fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
                     plain.state.is_none() && plain.film.mean == whole.film.mean && plain.film.variance == whole.film.variance
                 );
                 // another seed, other sums: the comparison sees something
-                let other = render(&tracer, &flat, &up_to(&PathOptions { seed: 4, ..options.clone() }, 16, None)).image;
+                let other = render(&tracer, &flat, &up_to(&options.clone().with_samples(|s| s.seed = 4), 16, None)).image;
                 assert_ne!(other.film.mean, whole.film.mean);
             }
         }
@@ -89,7 +89,13 @@ fn gpu_films_of_ambient_occlusion_go_on_too() {
         let tracer = tracer(&device, kind, &flat);
         let image = |spp: u32, start: Option<FilmState>| {
             let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..Default::default() };
-            ao::render(&tracer, &record, &AoOptions { size, spp, film, ..Default::default() }, &mut NoControl).unwrap()
+            ao::render(
+                &tracer,
+                &record,
+                &AoOptions { samples: SampleSettings { film, ..SampleSettings::new(size, spp, 0) }, ..Default::default() },
+                &mut NoControl,
+            )
+            .unwrap()
         };
         let whole = image(16, None);
         let [first, second] = [image(3, None), image(7, image(3, None).image.state)];
@@ -113,7 +119,7 @@ fn gpu_intervals_are_images_of_their_own() {
     let scene = by_name("cornell-box").unwrap();
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
-    let base = PathOptions { size: [24, 24], spp: 12, seed: 9, max_depth: 4, ..Default::default() };
+    let base = PathOptions { samples: SampleSettings::new([24, 24], 12, 9), max_depth: 4, ..Default::default() };
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let run = |options: &PathOptions| {
@@ -122,7 +128,7 @@ fn gpu_intervals_are_images_of_their_own() {
             (seen.0, last)
         };
         let film = FilmOptions { intervals: vec![1, 2, 4, 8], ..Default::default() };
-        let (seen, last) = run(&up_to(&PathOptions { film: film.clone(), ..base.clone() }, 12, None));
+        let (seen, last) = run(&up_to(&base.clone().with_samples(|s| s.film = film.clone()), 12, None));
         assert_eq!(seen.iter().map(|i| i.spp).collect::<Vec<_>>(), [1, 2, 4, 8], "{kind}");
         if kind != TracerKind::Compute {
             same(&format!("{kind}, 4 samples"), &seen[2], &run(&up_to(&base, 4, None)).1);
@@ -133,7 +139,7 @@ fn gpu_intervals_are_images_of_their_own() {
             same(&format!("{kind}, {} samples", image.spp), image, &alone);
         }
         // from the middle: those that are left
-        let options = PathOptions { film, ..base.clone() };
+        let options = base.clone().with_samples(|s| s.film = film);
         let (rest, again) = run(&up_to(&options, 12, seen[1].state.clone()));
         assert_eq!(rest.iter().map(|i| i.spp).collect::<Vec<_>>(), [4, 8], "{kind}");
         same(&format!("{kind}, from 2 samples"), &again, &last);
@@ -163,12 +169,12 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let scene = Scene { environment, ..scene_of(vec![(behind, matte(0.5))], camera) };
     let flat = FlatScene::new(&scene);
     let tracer = |flat: &FlatScene| tracer(&device, TracerKind::Compute, flat);
-    let tall = PathOptions { size: [3, 262_200], seed: 2, max_depth: 0, ..Default::default() };
-    assert_eq!(skylit::film::block::Block::cut(tall.size).len(), 2);
+    let tall = PathOptions { samples: SampleSettings::new([3, 262_200], 16, 2), max_depth: 0, ..Default::default() };
+    assert_eq!(skylit::film::block::Block::cut(tall.samples.size).len(), 2);
     let compute = tracer(&flat);
     let whole = render(&compute, &flat, &up_to(&tall, 3, None)).image;
     let film = FilmOptions { intervals: vec![1], ..Default::default() };
-    same("two blocks", &render(&compute, &flat, &up_to(&PathOptions { film, ..tall }, 3, None)).image, &whole);
+    same("two blocks", &render(&compute, &flat, &up_to(&tall.with_samples(|s| s.film = film), 3, None)).image, &whole);
     assert!(whole.film.variance.iter().any(|&v| v > 0.0), "all samples are alike");
 
     // a light in the dark: most tiles show nothing and are not traced
@@ -176,12 +182,12 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let scene = scene_of(vec![(shapes::sphere(DVec3::new(1.0, 0.5, 0.0), 0.4), emitter(2.0))], camera);
     let flat = FlatScene::new(&scene);
     let compute = tracer(&flat);
-    let options = PathOptions { size: [80, 60], seed: 6, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([80, 60], 16, 6), ..Default::default() };
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 4.0 / 3.0);
-    let tile_mask = TileMask::new(&flat, &record, options.size, 16).map(Arc::new);
+    let tile_mask = TileMask::new(&flat, &record, options.samples.size, 16).map(Arc::new);
     assert!(tile_mask.is_some(), "nothing is left out");
     let whole = render(&compute, &flat, &up_to(&options, 16, None)).image;
-    let covered = PathOptions { tile_mask, ..options };
+    let covered = options.with_samples(|s| s.tile_mask = tile_mask);
     let begun = render(&compute, &flat, &up_to(&covered, 5, None)).image;
     let gone_on = render(&compute, &flat, &up_to(&covered, 16, begun.state)).image;
     same("few tiles", &gone_on, &whole);
@@ -197,7 +203,7 @@ fn gpu_a_film_of_another_size_is_refused() {
     let tracer = tracer(&device, TracerKind::Compute, &flat);
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
     for other in [FilmState::new([8, 9], 3), FilmState::new([8, 8], 1)] {
-        let options = up_to(&PathOptions { size: [8, 8], ..Default::default() }, 4, Some(other));
+        let options = up_to(&PathOptions { samples: SampleSettings::new([8, 8], 16, 0), ..Default::default() }, 4, Some(other));
         let error = path::render(&tracer, &flat, &record, &options, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64);
         assert!(error.to_string().contains("cannot be resumed as one of 8x8 with 3"), "{error}");
@@ -225,14 +231,14 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
     let device = device();
     let scene = light_over_a_corner();
     let flat = FlatScene::new(&scene);
-    let base = PathOptions { size: [64, 48], seed: 11, max_depth: 1, ..Default::default() };
+    let base = PathOptions { samples: SampleSettings::new([64, 48], 16, 11), max_depth: 1, ..Default::default() };
     let compute = tracer(&device, TracerKind::Compute, &flat);
     // light samples find the light at once
-    let reference = render(&compute, &flat, &PathOptions { spp: 1024, seed: 12, ..base.clone() }).image.film;
+    let reference = render(&compute, &flat, &base.clone().with_samples(|s| (s.spp, s.seed) = (1024, 12))).image.film;
     assert!(reference.estimated_rmse() < 1e-3, "the reference is too noisy");
     let (target, most) = (0.03, 8192);
     let film = FilmOptions { target_rmse: Some(target), ..Default::default() };
-    let options = PathOptions { film, strategy: Strategy::Uniform, ..base };
+    let options = PathOptions { strategy: Strategy::Uniform, ..base.with_samples(|s| s.film = film) };
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let image = render(&tracer, &flat, &up_to(&options, most, None)).image;
@@ -274,11 +280,12 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
         // less error: those that are not good enough go on, from where they are
         let film = FilmOptions { target_rmse: Some(0.7 * target), ..Default::default() };
         let better =
-            render(&tracer, &flat, &up_to(&PathOptions { film, ..options.clone() }, 4 * most, image.state.clone())).image;
+            render(&tracer, &flat, &up_to(&options.clone().with_samples(|s| s.film = film), 4 * most, image.state.clone()))
+                .image;
         assert!(better.film.estimated_rmse() <= 0.7 * target && better.converged.unwrap().done == 48, "{kind}");
         assert!(rmse(&better.film, &reference, |_| true) <= 1.05 * target, "{kind}");
         // and without a target, all do
-        let untargeted = PathOptions { film: FilmOptions::default(), ..options.clone() };
+        let untargeted = options.clone().with_samples(|s| s.film = FilmOptions::default());
         let even = render(&tracer, &flat, &up_to(&untargeted, 300, image.state.clone()));
         assert!(even.image.film.samples.iter().zip(&image.film.samples).all(|(now, then)| *now == 300.max(*then)), "{kind}");
     }
@@ -295,7 +302,7 @@ fn holds_after(samples: u32, cut: u32) {
     let scene = Scene { environment, ..scene_of(vec![(behind, matte(0.5))], camera) };
     let flat = FlatScene::new(&scene);
     let tracer = tracer(&device, TracerKind::Compute, &flat);
-    let options = PathOptions { size: [8, 8], max_depth: 0, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new([8, 8], 16, 0), max_depth: 0, ..Default::default() };
     let begun = render(&tracer, &flat, &up_to(&options, cut, None)).image;
     let film = render(&tracer, &flat, &up_to(&options, samples, begun.state)).image.film;
     assert!(film.samples.iter().all(|&n| n == samples));
@@ -330,7 +337,7 @@ fn gpu_an_integrator_renders_again() {
     let device = device();
     let scene = skylit::scene::builtin::by_name("cornell-box").unwrap();
     let flat = FlatScene::for_paths(&scene);
-    let options = PathOptions { size: [16, 16], spp: 8, ..PathOptions::default() };
+    let options = PathOptions { samples: SampleSettings::new([16, 16], 8, 0), ..PathOptions::default() };
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
@@ -342,7 +349,8 @@ fn gpu_an_integrator_renders_again() {
         assert_eq!((first.bounce_rays, first.shadow_rays), (second.bounce_rays, second.shadow_rays), "{kind}");
         assert_ne!(first.image.film.mean, other.image.film.mean, "{kind}");
         let alone =
-            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut NoControl).unwrap();
+            path::render(&tracer, &flat, &record, &options.clone().with_samples(|s| (s.spp, s.seed) = (2, 3)), &mut NoControl)
+                .unwrap();
         assert_eq!(fewer.image.film.mean, alone.image.film.mean, "{kind}");
         let error = integrator.render(&tracer, &record, 9, 0, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64, "{error}");

@@ -37,7 +37,10 @@ fn converging() -> Settings {
 }
 
 fn options(spp: u32) -> PathOptions {
-    PathOptions { size: SIZE, spp, seed: 5, pixel_filter: PixelFilter::Centre, ..Default::default() }
+    PathOptions {
+        samples: SampleSettings { pixel_filter: PixelFilter::Centre, ..SampleSettings::new(SIZE, spp, 5) },
+        ..Default::default()
+    }
 }
 
 fn frames(tracer: &Tracer, flat: &FlatScene, settings: &Settings, options: &PathOptions) -> Realtime {
@@ -75,7 +78,7 @@ fn gpu_frames_the_parts_of_radiance_add_up() {
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &flat);
             let still = render(&tracer, &flat, &options).image.film.mean;
-            let mut frames = frames(&tracer, &flat, &plain(options.spp), &options);
+            let mut frames = frames(&tracer, &flat, &plain(options.samples.spp), &options);
             frames.frame(&tracer, &camera, &[]).unwrap();
             let got = frames.result().unwrap();
             assert_eq!(got.len(), still.len());
@@ -106,7 +109,7 @@ fn gpu_frames_at_rest_become_the_still() {
         let flat = FlatScene::for_paths(&scene);
         let tracer = tracer(&device, TracerKind::Compute, &flat);
         // without the noise of caustics, which no number of samples here ends
-        let paths = PathOptions { firefly_clamp: 1.0, pixel_filter: PixelFilter::Box, ..options(8192) };
+        let paths = PathOptions { firefly_clamp: 1.0, ..options(8192).with_samples(|s| s.pixel_filter = PixelFilter::Box) };
         let camera = record(&scene, &scene.cameras[0]);
         let mut integrator = PathIntegrator::new(&tracer, &flat, &paths).unwrap();
         let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
@@ -116,7 +119,7 @@ fn gpu_frames_at_rest_become_the_still() {
         let mean_error = |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
         let [early_least, early_still] = [35, 40].map(|spp| mean_error(&mut |seed| rmse(&still(spp, seed), &truth)));
         let early = mean_error(&mut |seed| {
-            let paths = PathOptions { seed, ..paths.clone() };
+            let paths = paths.clone().with_samples(|s| s.seed = seed);
             let mut frames = frames(&tracer, &flat, &converging(), &paths);
             for _ in 0..FRAMES[0] {
                 frames.frame(&tracer, &camera, &[]).unwrap();
@@ -172,7 +175,7 @@ fn gpu_frames_in_motion_are_clean_and_do_not_lag() {
         moving.frame(&tracer, &at(k), &[]).unwrap();
     }
     noisy.frame(&tracer, &at(23), &[]).unwrap();
-    let truth = PathOptions { pixel_filter: PixelFilter::Box, ..options(512) };
+    let truth = options(512).with_samples(|s| s.pixel_filter = PixelFilter::Box);
     let truth = PathIntegrator::new(&tracer, &flat, &truth).unwrap().render(&tracer, &at(23), 512, 9, &mut NoControl).unwrap();
     // the lamp's edge, at fifty times the radiance of the walls, is another matter
     let dark = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| v.min(0.5)).collect() };
@@ -247,7 +250,7 @@ fn gpu_frames_uncovered_pixels_have_more_paths() {
             let [with_history, plain] = [32, 1].map(|history| {
                 let launch_rays = if seed % 2 == 0 { u32::MAX } else { all };
                 let settings = Settings { history, antialias: false, seed, launch_rays, ..plain(1) };
-                let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
+                let mut frames = frames(&tracer, &flat, &settings, &options(1).with_samples(|s| s.seed = seed));
                 frames.frame(&tracer, &camera, &[]).unwrap();
                 frames.frame(&tracer, &jumped, &[]).unwrap();
                 frames
@@ -326,13 +329,13 @@ fn gpu_frames_follow_a_sun_that_jumps() {
     let camera = record(flat.scene, &flat.scene.cameras[0]);
     let pixels = u64::from(SIZE[0] * SIZE[1]);
     for (antialias, pixel_filter) in [(false, PixelFilter::Centre), (true, PixelFilter::Box)] {
-        let options = |spp| PathOptions { pixel_filter, ..options(spp) };
+        let options = |spp| options(spp).with_samples(|s| s.pixel_filter = pixel_filter);
         let truth = render(&turned_tracer, &turned, &options(1024)).image.film.mean;
         for rays_per_pixel in [1, 4] {
             let (mut errors, seeds) = ([0.0; 3], 4);
             for seed in 0..seeds {
                 let settings = Settings { seed, rays_per_pixel, antialias, ..converging() };
-                let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
+                let mut frames = frames(&tracer, &flat, &settings, &options(1).with_samples(|s| s.seed = seed));
                 for _ in 0..16 {
                     frames.frame(&tracer, &camera, &[]).unwrap();
                 }
@@ -459,7 +462,7 @@ fn gpu_frames_lights_move() {
     for kind in tracers(&device) {
         let flat = FlatScene::with_motion_and_blend(&scene, motion(), Blend::Stochastic).unwrap();
         let mut moving = tracer(&device, kind, &flat);
-        let mut frames = frames(&moving, &flat, &plain(options.spp), &options);
+        let mut frames = frames(&moving, &flat, &plain(options.samples.spp), &options);
         frames.frame(&moving, &camera, &[]).unwrap();
         let first = frames.result().unwrap();
         for time in [0.5, 0.9] {
@@ -497,7 +500,7 @@ fn gpu_frames_lights_move() {
 fn gpu_frames_interrupted_leave_histories() {
     let device = device();
     let scene = scene("cornell-spheres");
-    let options = PathOptions { size: SIZE, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new(SIZE, 16, 0), ..Default::default() };
     let flat = FlatScene::for_paths(&scene);
     let cameras = [0.0, 0.01, 0.02].map(|x| {
         let mut camera = scene.cameras[0].clone();
@@ -535,7 +538,7 @@ fn gpu_frames_continue_in_another_size() {
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let with = |size, settings: Settings| {
-            let options = PathOptions { size, ..Default::default() };
+            let options = PathOptions { samples: SampleSettings::new(size, 16, 0), ..Default::default() };
             Realtime::radiance(&tracer, &flat, size, &settings, &options).unwrap()
         };
         let pipeline = |size, seed| with(size, Settings { seed, ..converging() });

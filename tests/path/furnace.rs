@@ -14,7 +14,7 @@ pub fn furnace(material: Material) -> Scene {
 }
 
 pub fn options(spp: u32, strategy: Strategy) -> PathOptions {
-    PathOptions { size: [24, 24], spp, seed: 3, strategy, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([24, 24], spp, 3), strategy, ..Default::default() }
 }
 
 #[test]

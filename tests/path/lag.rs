@@ -41,10 +41,13 @@ fn record(scene: &Scene) -> CameraRecord {
 
 /// The red of a still, filtered as frames are.
 fn still(tracer: &Tracer, flat: &FlatScene) -> Vec<f32> {
-    let options = PathOptions { size: SIZE, spp: 256, seed: 9, pixel_filter: PixelFilter::Box, ..Default::default() };
+    let options = PathOptions {
+        samples: SampleSettings { pixel_filter: PixelFilter::Box, ..SampleSettings::new(SIZE, 256, 9) },
+        ..Default::default()
+    };
     let camera = record(flat.scene);
     let mut integrator = PathIntegrator::new(tracer, flat, &options).unwrap();
-    red(&integrator.render(tracer, &camera, options.spp, options.seed, &mut NoControl).unwrap().image.film.mean)
+    red(&integrator.render(tracer, &camera, options.samples.spp, options.samples.seed, &mut NoControl).unwrap().image.film.mean)
 }
 
 fn red(values: &[f32]) -> Vec<f32> {
@@ -53,7 +56,7 @@ fn red(values: &[f32]) -> Vec<f32> {
 
 fn frames(tracer: &Tracer, flat: &FlatScene, preset: Preset, seed: u32) -> Realtime {
     let settings = Settings { antialias: true, converge: true, seed, ..preset.settings() };
-    let options = PathOptions { size: SIZE, spp: settings.rays_per_pixel, seed, ..Default::default() };
+    let options = PathOptions { samples: SampleSettings::new(SIZE, settings.rays_per_pixel, seed), ..Default::default() };
     Realtime::radiance(tracer, flat, SIZE, &settings, &options).unwrap()
 }
 

@@ -14,7 +14,7 @@ const HEIGHT: f64 = 2.0;
 type Source = dyn Fn(&mut Scene);
 
 fn options(spp: u32, seed: u32) -> PathOptions {
-    PathOptions { size: [24, 24], spp, seed, max_depth: 1, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([24, 24], spp, seed), max_depth: 1, ..Default::default() }
 }
 
 /// A ground of this side, of which the view shows what is around the lamp.
@@ -83,8 +83,9 @@ fn adds_up(device: &Arc<Device>, what: &str, scene: &Scene, sources: [&Source; 2
         let flat = FlatScene::for_paths(scene);
         render(&tracer(device, kinds[0], &flat), &flat, options).image.film
     };
-    let alone =
-        sources.map(|source| film(&with(&[source]), &PathOptions { spp: 16 * options.spp, seed: 9, ..options.clone() }));
+    let alone = sources.map(|source| {
+        film(&with(&[source]), &options.clone().with_samples(|s| (s.spp, s.seed) = (16 * options.samples.spp, 9)))
+    });
     let both = film(&with(&sources), options);
     let truth: Vec<f64> = (alone[0].mean.iter().zip(&alone[1].mean)).map(|(&a, &b)| f64::from(a) + f64::from(b)).collect();
     let mean = truth.iter().sum::<f64>() / truth.len() as f64;

@@ -19,7 +19,7 @@ fn ambient(color: Vec3, radius: f64, falloff: f64) -> Ambient {
 
 /// What the integrator makes of these settings.
 fn lit(spp: u32, ambient: Ambient) -> PathOptions {
-    PathOptions { size: SIZE, spp, seed: 5, max_depth: 1, ambient: Some(ambient), ..Default::default() }
+    PathOptions { samples: SampleSettings::new(SIZE, spp, 5), max_depth: 1, ambient: Some(ambient), ..Default::default() }
 }
 
 /// A floor that fills the view, without any light.
@@ -72,16 +72,13 @@ fn gpu_lit_occlusion_can_darken_all_light() {
     on_all_tracers(&builtin::by_name("cornell-box").unwrap(), |kind, tracer, flat| {
         let dark = ambient(Vec3::ZERO, 0.3, 1.0);
         // at pixel centres both are constant over a pixel, and samples of both are independent
-        let options = PathOptions { pixel_filter: path::PixelFilter::Centre, ..lit(1024, dark) };
+        let options = lit(1024, dark).with_samples(|s| s.pixel_filter = path::PixelFilter::Centre);
         let all = PathOptions { ambient: Some(Ambient { occluded: OccludedLight::All, ..dark }), ..options.clone() };
         let [all, direct] = [all, options].map(|o| render(tracer, flat, &o).image.film.mean);
         let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
         let ao = AoOptions {
-            size: SIZE,
-            spp: 1024,
-            seed: 6,
+            samples: SampleSettings { pixel_filter: path::PixelFilter::Centre, ..SampleSettings::new(SIZE, 1024, 6) },
             radius: 0.3,
-            pixel_filter: path::PixelFilter::Centre,
             ..Default::default()
         };
         let visible = ao::render(tracer, &record, &ao, &mut NoControl).unwrap().image.film.mean;
@@ -107,7 +104,7 @@ fn gpu_lit_without_lights_is_ao_times_albedo_times_ambient() {
         let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
         for (radius, falloff) in [(f64::INFINITY, 1.0), (1.5, 1.0), (f64::INFINITY, 2.0), (2.0, 1.5)] {
             let spp = if falloff > 1.0 { 64 } else { 8 };
-            let options = AoOptions { size: SIZE, spp, seed: 5, radius, falloff, ..Default::default() };
+            let options = AoOptions { samples: SampleSettings::new(SIZE, spp, 5), radius, falloff, ..Default::default() };
             let visibility = ao::render(tracer, &record, &options, &mut NoControl).unwrap().image.film;
             let result = render(tracer, flat, &lit(spp, ambient(colour, radius, falloff)));
             let film = result.image.film;

@@ -36,8 +36,8 @@ use common::{assert_validation_clean, tracers};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::Film;
-use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
+use skylit::film::{NoControl, SampleSettings};
 use skylit::gpu::{Device, Options};
 use skylit::integrators::path::{self, PathOptions, PathResult, Strategy};
 use skylit::scene::material::MaterialKind;
@@ -59,7 +59,7 @@ fn tracer(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Tracer {
 }
 
 fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResult {
-    let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+    let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
     let result =
         path::render(tracer, flat, &record, options, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));

@@ -18,7 +18,7 @@ fn sheet(z: f64) -> Geometry {
 }
 
 fn options(spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 7, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 7), ..Default::default() }
 }
 
 fn covered(alpha: f32, material: Material) -> Material {
@@ -251,7 +251,8 @@ fn gpu_normal_maps_follow_tangents() {
             }
             let flat = FlatScene::for_paths(&scene);
             for kind in picked(&device) {
-                let options = PathOptions { view: Some(View::Normals), size: [4, 4], spp: 2, ..options(1) };
+                let options =
+                    PathOptions { view: Some(View::Normals), ..options(1).with_samples(|s| (s.size, s.spp) = ([4, 4], 2)) };
                 let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
                 for pixel in film.mean.chunks(3) {
                     let off = (Vec3::from_slice(pixel) - expected).length();
@@ -325,8 +326,15 @@ fn gpu_views_show_surfaces() {
     let flat = FlatScene::for_paths(&scene);
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
-        let of =
-            |view| render(&tracer, &flat, &PathOptions { view: Some(view), size: [8, 8], spp: 4, ..options(1) }).image.film;
+        let of = |view| {
+            render(
+                &tracer,
+                &flat,
+                &PathOptions { view: Some(view), ..options(1).with_samples(|s| (s.size, s.spp) = ([8, 8], 4)) },
+            )
+            .image
+            .film
+        };
         assert!(of(View::Albedo).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::new(0.2, 0.5, 0.8)).length() < 1e-6));
         assert!(of(View::Normals).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::Z).length() < 1e-6));
         let depth = of(View::Depth);

@@ -10,7 +10,7 @@ fn down_from(y: f64) -> Camera {
 }
 
 fn options(spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 11, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 11), ..Default::default() }
 }
 
 /// What leaves of a colour this much after a unit of length.

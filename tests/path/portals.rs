@@ -52,7 +52,7 @@ fn bright() -> [(&'static str, Environment); 2] {
 }
 
 fn options(strategy: Strategy, spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 5, strategy, max_depth: 1, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 5), strategy, max_depth: 1, ..Default::default() }
 }
 
 #[test]

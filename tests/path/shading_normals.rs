@@ -8,7 +8,7 @@ use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
 use std::f64::consts::PI;
 
 fn options(spp: u32) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 9, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 9), ..Default::default() }
 }
 
 /// Chiang, Li, Burley, "Taming the Shadow Terminator" (2019): what is left of light from `wi` on a surface of normal z whose shading normal is `n`.

@@ -60,7 +60,7 @@ fn with_levels(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Trac
 }
 
 fn options(spp: u32, texture_filter: TextureFilter) -> PathOptions {
-    PathOptions { size: [16, 16], spp, seed: 3, texture_filter, ..Default::default() }
+    PathOptions { samples: SampleSettings::new([16, 16], spp, 3), texture_filter, ..Default::default() }
 }
 
 fn albedo(spp: u32, texture_filter: TextureFilter) -> PathOptions {
@@ -129,11 +129,11 @@ fn gpu_cones_see_a_checkered_plane_with_less_noise() {
     let device = device();
     let scene = plane();
     let flat = FlatScene::for_paths(&scene);
-    let sized = |o: PathOptions| PathOptions { size: [48, 32], ..o };
+    let sized = |o: PathOptions| o.with_samples(|s| s.size = [48, 32]);
     let truth = render(
         &tracer(&device, TracerKind::Compute, &flat),
         &flat,
-        &sized(PathOptions { seed: 91, ..albedo(4096, TextureFilter::Bilinear) }),
+        &sized(albedo(4096, TextureFilter::Bilinear).with_samples(|s| s.seed = 91)),
     );
     for kind in picked(&device) {
         let tracer = with_levels(&device, kind, &flat);
@@ -284,7 +284,7 @@ fn gpu_tracers_agree_on_cones() {
         .map(|kind| {
             let tracer = with_levels(&device, kind, &flat);
             let [cones, points] = [TextureFilter::RayCone, TextureFilter::Bilinear].map(|f| {
-                let o = PathOptions { size: [32, 24], max_depth: 6, ..options(64, f) };
+                let o = PathOptions { max_depth: 6, ..options(64, f).with_samples(|s| s.size = [32, 24]) };
                 render(&tracer, &flat, &o).image.film
             });
             for (found, expected) in mean_colour(&cones).into_iter().zip(mean_colour(&points)) {

@@ -13,7 +13,7 @@ fn gpu_a_room_of_light() {
         // seen from inside: the box's faces look outwards
         let walls = Material { emissive: Vec3::ONE, double_sided: true, ..matte(albedo) };
         let room = scene_of(vec![(shapes::cuboid(-h, h), walls)], camera.clone());
-        let options = PathOptions { size: [16, 16], spp: 256, seed: 9, ..Default::default() };
+        let options = PathOptions { samples: SampleSettings::new([16, 16], 256, 9), ..Default::default() };
         let expected = 1.0 / (1.0 - f64::from(albedo));
         for strategy in [Strategy::Mis, Strategy::Bsdf, Strategy::Light] {
             holds(&device, "room", &room, &PathOptions { strategy, ..options.clone() }, expected, 2e-2);
@@ -27,21 +27,26 @@ fn gpu_a_room_of_light() {
         // and without its first n bounces the rest of the series
         for min_depth in [1u32, 2] {
             let rest = f64::from(albedo).powi(min_depth as i32) * expected;
-            let options = PathOptions { min_depth, rr_depth: 100, spp: 64, ..options.clone() };
+            let options = PathOptions { min_depth, rr_depth: 100, ..options.clone().with_samples(|s| s.spp = 64) };
             holds(&device, &format!("room, without {min_depth} bounces"), &room, &options, rest, 2e-2);
         }
         // or with the rest of the series scaled, from the second bounce on
         for indirect_scale in [0.25, 3.0] {
             let direct = 1.0 + f64::from(albedo);
             let scaled = direct + f64::from(indirect_scale) * (expected - direct);
-            let options = PathOptions { indirect_scale, rr_depth: 100, spp: 64, ..options.clone() };
+            let options = PathOptions { indirect_scale, rr_depth: 100, ..options.clone().with_samples(|s| s.spp = 64) };
             holds(&device, &format!("room, indirect light by {indirect_scale}"), &room, &options, scaled, 2e-2);
         }
         // or with each term from the second bounce on clamped: sampled by the BSDF, a path adds the terms themselves
         let clamp = 0.25f32;
         let terms = (0..100).map(|k| (k, f64::from(albedo).powi(k)));
         let clamped: f64 = terms.map(|(k, term)| if k < 2 { term } else { term.min(f64::from(clamp)) }).sum();
-        let options = PathOptions { firefly_clamp: clamp, strategy: Strategy::Bsdf, rr_depth: 100, spp: 64, ..options.clone() };
+        let options = PathOptions {
+            firefly_clamp: clamp,
+            strategy: Strategy::Bsdf,
+            rr_depth: 100,
+            ..options.clone().with_samples(|s| s.spp = 64)
+        };
         holds(&device, "room, indirect light clamped", &room, &options, clamped, 2e-2);
     }
 }
@@ -52,7 +57,7 @@ fn gpu_parts_of_light_add_up() {
     let device = device();
     let scene = by_name("cornell-glass-sphere").unwrap();
     let flat = FlatScene::for_paths(&scene);
-    let whole = PathOptions { size: [16, 16], spp: 16, seed: 1, ..Default::default() };
+    let whole = PathOptions { samples: SampleSettings::new([16, 16], 16, 1), ..Default::default() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let [direct, indirect, all] =
@@ -73,11 +78,12 @@ fn gpu_roulette_changes_no_mean() {
     let device = device();
     let scene = by_name("cornell-box").unwrap();
     let flat = FlatScene::new(&scene);
-    let options = PathOptions { size: [16, 16], spp: 256, seed: 1, max_depth: 12, rr_depth: 100, ..Default::default() };
+    let options =
+        PathOptions { samples: SampleSettings::new([16, 16], 256, 1), max_depth: 12, rr_depth: 100, ..Default::default() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let whole = render(&tracer, &flat, &options);
-        let cut = render(&tracer, &flat, &PathOptions { rr_depth: 1, seed: 2, ..options.clone() });
+        let cut = render(&tracer, &flat, &PathOptions { rr_depth: 1, ..options.clone().with_samples(|s| s.seed = 2) });
         assert!(cut.bounce_rays * 2 < whole.bounce_rays, "{kind}: roulette ends nothing");
         let (a, b) = (whole.image.film.mean_and_error(), cut.image.film.mean_and_error());
         println!("{kind}: {a:?}, with roulette {b:?}; longest paths {} and {}", whole.longest_path, cut.longest_path);
@@ -96,7 +102,7 @@ fn gpu_three_tracers_one_image_of_paths() {
     for name in ["cornell-box", "cornell-mirror", "cornell-glass-sphere"] {
         let scene = by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
-        let options = PathOptions { size: [32, 24], spp: 16, seed: 4, max_depth: 6, ..Default::default() };
+        let options = PathOptions { samples: SampleSettings::new([32, 24], 16, 4), max_depth: 6, ..Default::default() };
         let mut images: Vec<(TracerKind, Vec<f32>)> = Vec::new();
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &flat);
@@ -131,9 +137,19 @@ fn gpu_one_bounce_under_a_white_sky_is_ambient_occlusion() {
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.5);
-        let occlusion =
-            ao::render(&tracer, &record, &AoOptions { size, spp: 256, ..Default::default() }, &mut NoControl).unwrap();
-        let options = PathOptions { size, spp: 256, seed: 8, max_depth: 1, white_sky: Some(0.5), ..Default::default() };
+        let occlusion = ao::render(
+            &tracer,
+            &record,
+            &AoOptions { samples: SampleSettings::new(size, 256, 0), ..Default::default() },
+            &mut NoControl,
+        )
+        .unwrap();
+        let options = PathOptions {
+            samples: SampleSettings::new(size, 256, 8),
+            max_depth: 1,
+            white_sky: Some(0.5),
+            ..Default::default()
+        };
         let sky = render(&tracer, &flat, &options).image.film;
         let error: f64 = (0..occlusion.image.film.mean.len())
             .map(|k| f64::from(occlusion.image.film.mean[k] - sky.mean[3 * k]).powi(2))

@@ -113,13 +113,12 @@ fn everything() -> Scene {
 #[test]
 fn gpu_kernels_of_all_features_are_valid() {
     let device = new_device();
-    let base = PathOptions { size: [8, 8], spp: 1, max_depth: 3, ..Default::default() };
+    let base = PathOptions { samples: SampleSettings::new([8, 8], 1, 0), max_depth: 3, ..Default::default() };
     let whole = PathOptions {
         firefly_clamp: 10.0,
         min_depth: 1,
         indirect_scale: 2.0,
         lens: Some(Lens { radius: 0.01, focus: 1.0 }),
-        pixel_filter: PixelFilter::Tent,
         texture_filter: TextureFilter::RayCone,
         ambient: Some(Ambient {
             color: Vec3::ONE,
@@ -127,7 +126,7 @@ fn gpu_kernels_of_all_features_are_valid() {
             hemisphere: Hemisphere::Shading,
             occluded: OccludedLight::All,
         }),
-        ..base.clone()
+        ..base.clone().with_samples(|s| s.pixel_filter = PixelFilter::Tent)
     };
     let all_needs = Needs { shading: true, compensation: true, mip_levels: true, baked_occlusion: true, ..Needs::default() };
     let white = Needs { white: true, ..all_needs };
@@ -146,8 +145,8 @@ fn gpu_kernels_of_all_features_are_valid() {
             // frames in real time trace the same paths, and more
             if kind == TracerKind::Compute && options.ambient.is_some() {
                 let settings = Settings { antialias: true, converge: true, ..Preset::Balanced.settings() };
-                let mut frames = Realtime::radiance(&tracer, &flat, options.size, &settings, options).unwrap();
-                let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+                let mut frames = Realtime::radiance(&tracer, &flat, options.samples.size, &settings, options).unwrap();
+                let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
                 let camera = CameraRecord::new(&scene.cameras[0], flat.origin, aspect);
                 for _ in 0..2 {
                     frames.frame(&tracer, &camera, &[]).unwrap();

@@ -4,7 +4,12 @@ use super::*;
 use skylit::scene::builtin::shapes;
 
 fn whitted(spp: u32) -> PathOptions {
-    PathOptions { size: [32, 24], spp, seed: 5, strategy: Strategy::Light, specular_only: true, ..Default::default() }
+    PathOptions {
+        samples: SampleSettings::new([32, 24], spp, 5),
+        strategy: Strategy::Light,
+        specular_only: true,
+        ..Default::default()
+    }
 }
 
 /// Where there is neither mirror nor glass it is direct light: the same bits as paths of one bounce by light samples.

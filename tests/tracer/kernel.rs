@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3, Vec2};
-use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
+use skylit::film::{NoControl, SampleSettings};
 use skylit::gpu::Device;
 use skylit::integrators::ao::{self, AoOptions};
 use skylit::integrators::rays::Mode;
@@ -327,7 +327,7 @@ fn gpu_kernel_empty_queues() {
         for falloff in [1.0, 3.0] {
             for (towards, seen) in [(target, true), (eye * 2.0 - target, false)] {
                 let camera = CameraRecord::new(&Camera::look_at(eye, towards, DVec3::Y, 0.3), scene.origin(), 1.0);
-                let options = AoOptions { size: [70, 33], spp: 3, falloff, ..Default::default() };
+                let options = AoOptions { samples: SampleSettings::new([70, 33], 3, 0), falloff, ..Default::default() };
                 let image = ao::render(&tracer, &camera, &options, &mut NoControl).unwrap();
                 let covered = image.image.film.coverage.iter().filter(|&&c| c > 0.0).count();
                 assert_eq!(covered > 0, seen, "{kind}: {covered} pixels covered");

@@ -97,7 +97,7 @@ impl Signal {
     ) -> Result<Realtime> {
         let settings = self.render_settings(preset);
         let options = frame_path_options(&settings, flat.scene, camera, self.size, &frame)?;
-        let options = options.map(|options| PathOptions { seed: frame.seed, ..options });
+        let options = options.map(|options| options.with_samples(|s| s.seed = frame.seed));
         pipeline(tracer, flat, self.size, &frame, options.as_ref())
     }
 
@@ -106,7 +106,7 @@ impl Signal {
         let frame = self.preset_settings(Preset::Balanced, None)?;
         Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &frame)? {
             Some(options) => {
-                let options = PathOptions { spp: MAX_PATHS, ..options };
+                let options = options.with_samples(|s| s.spp = MAX_PATHS);
                 Sampler::Paths { integrator: Box::new(PathIntegrator::new(tracer, flat, &options)?), options }
             }
             None => {

@@ -22,6 +22,7 @@ use super::scenes::table_name;
 use super::session::Session;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
+use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{self, PathOptions};
 use crate::measure::metrics::ImagePair;
@@ -85,7 +86,7 @@ impl PathSession<'_> {
         let (kind, _) = args.tracer.on(self.device.info());
         let tracer = self.device.tracer(&flat, kind, needs, ComputeOptions::default(), &build)?;
         let own = |strategy| -> Result<Engine> {
-            let options = PathOptions { size, spp: MAX_SPP, strategy, ..PathOptions::default() };
+            let options = PathOptions { samples: SampleSettings::new(size, MAX_SPP, 0), strategy, ..PathOptions::default() };
             Engine::own(&tracer, &flat, camera, &options)
         };
         let mut engine = own(path::Strategy::Mis)?;

@@ -11,7 +11,6 @@ mod report;
 pub mod settings;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 pub use attenuation::Attenuation;
 pub use hemisphere::Hemisphere;
@@ -21,14 +20,11 @@ use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered}
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
-use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
+use crate::film::accumulate::{Accumulated, Estimator, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::film::schedule::FilmOptions;
-use crate::film::tile_mask::TileMask;
+use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
-use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
 use crate::settings::Capability;
@@ -42,49 +38,29 @@ const NO_HIT: f32 = -1.0;
 /// Options of an ambient occlusion image.
 #[derive(Clone, Debug)]
 pub struct AoOptions {
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Samples per pixel: one camera ray and one occlusion ray each.
-    pub spp: u32,
-    /// Seed of the sampler.
-    pub seed: u32,
+    /// Settings of samples, of one camera ray and one occlusion ray each.
+    pub samples: SampleSettings,
     /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
     pub radius: f64,
     /// AO falloff c, at least 1: a hit at distance d occludes by c^-d; 1 is binary.
     pub falloff: f64,
     /// Axis of the hemisphere.
     pub hemisphere: Hemisphere,
-    /// Pixel reconstruction filter.
-    pub pixel_filter: PixelFilter,
-    /// Stop after this time and keep the image so far.
-    pub time_limit: Option<Duration>,
-    /// Keep the rays of the first sample.
-    pub keep_rays: bool,
-    /// Tiles of the image that show geometry; `None`: all tiles are traced.
-    pub tile_mask: Option<Arc<TileMask>>,
-    /// The film to resume, and when to save it. Rays are kept only if the film starts empty.
-    pub film: FilmOptions,
 }
 
 impl Default for AoOptions {
     fn default() -> Self {
-        Self {
-            size: [1280, 720],
-            spp: 16,
-            seed: 0,
-            radius: f64::INFINITY,
-            falloff: 1.0,
-            hemisphere: Hemisphere::Geometric,
-            pixel_filter: PixelFilter::Box,
-            time_limit: None,
-            keep_rays: false,
-            tile_mask: None,
-            film: FilmOptions::default(),
-        }
+        Self { samples: SampleSettings::default(), radius: f64::INFINITY, falloff: 1.0, hemisphere: Hemisphere::Geometric }
     }
 }
 
 impl AoOptions {
+    /// The same options with changed settings of samples.
+    pub fn with_samples(mut self, change: impl FnOnce(&mut SampleSettings)) -> Self {
+        change(&mut self.samples);
+        self
+    }
+
     /// Attenuation of occlusion with distance.
     pub fn attenuation(&self) -> Attenuation {
         Attenuation { radius: self.radius, falloff: self.falloff }
@@ -98,17 +74,10 @@ impl AmbientOcclusion {
     fn options(job: &RenderJob) -> AoOptions {
         let ao = &job.settings.ao;
         AoOptions {
-            size: job.size,
-            spp: job.spp,
-            seed: job.seed,
+            samples: job.samples.clone(),
             radius: ao.radius(),
             falloff: ao.ao_falloff.unwrap_or(1.0),
             hemisphere: ao.hemisphere(),
-            pixel_filter: job.pixel_filter,
-            time_limit: job.time_limit,
-            keep_rays: job.keep_rays,
-            tile_mask: None,
-            film: job.film.clone(),
         }
     }
 }
@@ -160,7 +129,7 @@ impl Integrator for AmbientOcclusion {
 
     /// Not if rays are dumped: a dump must hold the rays of all pixels. Not if pixels see beyond their area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
-        !job.keep_rays && job.pixel_filter.is_within_pixel()
+        !job.samples.keep_rays && job.samples.pixel_filter.is_within_pixel()
     }
 
     fn sees_environment(&self) -> bool {
@@ -169,19 +138,9 @@ impl Integrator for AmbientOcclusion {
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
-        let AoOptions {
-            size: _,
-            spp: _,
-            time_limit: _,
-            keep_rays: _,
-            tile_mask: _,
-            film: _,
-            seed: _,
-            radius,
-            falloff,
-            hemisphere,
-            pixel_filter,
-        } = Self::options(job);
+        let AoOptions { samples, radius, falloff, hemisphere } = Self::options(job);
+        let SampleSettings { size: _, spp: _, seed: _, pixel_filter, time_limit: _, keep_rays: _, tile_mask: _, film: _ } =
+            samples;
         vec![
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
@@ -190,15 +149,8 @@ impl Integrator for AmbientOcclusion {
         ]
     }
 
-    fn render(
-        &self,
-        tracer: &Tracer,
-        flat: &FlatScene,
-        job: &RenderJob,
-        tile_mask: Option<Arc<TileMask>>,
-        control: &mut dyn Control,
-    ) -> Result<Rendered> {
-        let options = AoOptions { tile_mask, ..Self::options(job) };
+    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered> {
+        let options = Self::options(job);
         let result = render(tracer, &job.camera_record(flat), &options, control)?;
         let report = report::report(&options, &result);
         Ok(Rendered { image: result.image, report, kept_rays: [result.kept_primary, result.kept_occlusion] })
@@ -220,9 +172,9 @@ pub struct AoResult {
     pub skipped_rays: u64,
     /// Camera rays started below the root of the hierarchy in launches of enough samples.
     pub has_entry_points: bool,
-    /// Camera rays of the first sample, if [`AoOptions::keep_rays`] is set.
+    /// Camera rays of the first sample, if [`SampleSettings::keep_rays`] is set.
     pub kept_primary: Vec<Ray>,
-    /// Occlusion rays of the first sample, if [`AoOptions::keep_rays`] is set.
+    /// Occlusion rays of the first sample, if [`SampleSettings::keep_rays`] is set.
     pub kept_occlusion: Vec<Ray>,
 }
 
@@ -247,37 +199,29 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
     let device = tracer.device();
-    let most = max_rays(launch_rays(&device.info), options.size, options.spp, AoEstimator::SAMPLE_BITS);
-    let sample_bits = options.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
+    let samples = &options.samples;
+    let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
+    let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
         rays: AoRays::new(tracer, options.attenuation(), most, sample_bits)?,
         has_entry_points: false,
         resolve: shaders::RESOLVE.pipeline(device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
-        dumps: match options.keep_rays {
+        dumps: match samples.keep_rays {
             true => Some([ray_buffer(device, most)?, ray_buffer(device, most)?]),
             false => None,
         },
         kept: Default::default(),
-    };
-    let plan = Plan {
-        size: options.size,
-        spp: options.spp,
-        seed: options.seed,
-        time_limit: options.time_limit,
-        tile_mask: options.tile_mask.as_deref(),
-        film: &options.film,
     };
     let params = estimator.rays.params(BlockParams {
         orthographic: camera.orthographic.into(),
         hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
         falloff_log2: options.attenuation().falloff_log2() as f32,
         radius: options.attenuation().reach() as f32,
-        pixel_filter: options.pixel_filter as u32,
         ..Default::default()
     });
     estimator.has_entry_points = estimator.rays.has_entry_points(&params);
-    let image = accumulate(tracer, camera, &plan, &params, &mut estimator, control)?;
+    let image = accumulate(tracer, camera, samples, &params, &mut estimator, control)?;
     let has_entry_points = estimator.has_entry_points;
     let [kept_primary, kept_occlusion] = estimator.kept;
     let occlusion_rays = image.covered;

@@ -6,13 +6,14 @@
 use glam::Vec3;
 
 pub use super::ambient_light::{Ambient, EnvironmentLight, OccludedLight};
-use super::{AMBIENT_COUNT, FirstSurfaceRays, PathEstimator, PathOptions, Strategy};
+use super::buffers::{AMBIENT_COUNT, FirstSurfaceRays};
+use super::{PathEstimator, PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
-use crate::film::Control;
-use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
+use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, accumulate, max_rays};
 use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
+use crate::film::{Control, SampleSettings};
 use crate::gpu::{Commands, Timing};
 use crate::integrators::ao::Attenuation;
 use crate::shaders;
@@ -33,8 +34,10 @@ pub struct AmbientSample {
 /// Receives the samples of a pixel that were taken together: index of the pixel (rows from the top), and samples.
 pub type TakeSamples<'a> = dyn FnMut(usize, &[AmbientSample]) + 'a;
 
-/// Traces the occlusion rays of an image, to their nearest hits without a limit, and hands their distances to `take`: `options.spp` samples of each pixel in all. Camera, seed and
-/// hemisphere are those of `options`; the samples are those of an image of the integrator `lit` with the same seed. The tracer must have been built from `flat` with
+/// Traces the occlusion rays of an image, to their nearest hits without a limit, and hands their
+/// distances to `take`: `options.samples.spp` samples of each pixel in all. Camera, seed and
+/// hemisphere are those of `options`; the samples are those of an image of the integrator `lit`
+/// with the same seed. The tracer must have been built from `flat` with
 /// [`crate::tracer::Needs::shading`].
 ///
 /// # Errors
@@ -50,8 +53,12 @@ pub fn trace(
     let unlimited = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
     let hemisphere = options.ambient.map(|a| a.hemisphere).unwrap_or_default();
     let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere, occluded: OccludedLight::Ambient };
+    // every sample of every tile, in one go
+    let SampleSettings { size, spp, seed, pixel_filter, .. } = options.samples;
+    let samples = SampleSettings { size, spp, seed, pixel_filter, ..Default::default() };
     // the first surface alone, and no light but the ambient one
     let options = PathOptions {
+        samples,
         max_depth: 0,
         min_depth: 1,
         strategy: Strategy::Bsdf,
@@ -59,21 +66,12 @@ pub fn trace(
         background_only: true,
         ..options.clone()
     };
-    let capacity = max_rays(launch_rays(&tracer.device().info), options.size, options.spp, MAX_SAMPLE_BITS);
+    let capacity = max_rays(launch_rays(&tracer.device().info), size, spp, MAX_SAMPLE_BITS);
     let mut paths = PathEstimator::new(tracer, flat, &options, capacity, false)?;
     paths.find_camera_media(camera)?;
     let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
-    let mut estimator = DistanceEstimator { paths, distance, block: None, width: options.size[0], take };
-    let plan = Plan {
-        size: options.size,
-        spp: options.spp,
-        seed: options.seed,
-        time_limit: None,
-        tile_mask: None,
-        film: &Default::default(),
-    };
-    let params = BlockParams { pixel_filter: options.pixel_filter as u32, ..ambient.block_params() };
-    accumulate(tracer, camera, &plan, &params, &mut estimator, control).map(drop)
+    let mut estimator = DistanceEstimator { paths, distance, block: None, width: size[0], take };
+    accumulate(tracer, camera, &options.samples, &ambient.block_params(), &mut estimator, control).map(drop)
 }
 
 struct DistanceEstimator<'a, 't> {
@@ -119,10 +117,10 @@ impl PathEstimator {
         let Some(ambient) = self.of_first_surface.iter().find(of_ambient) else { return Ok(Vec::new()) };
         let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.block_params[k].address(), ..push });
         commands.run(|r| {
-            self.queues[0].clear(r);
+            self.buffers.queues[0].clear(r);
             self.clear_light_queues(r);
             r.barrier();
-            self.camera.record(r, &camera);
+            self.pipelines.camera.record(r, &camera);
             r.barrier();
             distance.record(r, &ambient.queue.push(occlusion, push.count));
             r.barrier();
@@ -134,7 +132,7 @@ impl PathEstimator {
         let size = size_of::<AmbientSample>() as u64;
         // all samples of a pixel at once
         let record = size << MAX_SAMPLE_BITS;
-        self.radiance.read_with(0, size * u64::from(count), record, |first, bytes| {
+        self.buffers.radiance.read_with(0, size * u64::from(count), record, |first, bytes| {
             let samples: Vec<AmbientSample> = bytemuck::pod_collect_to_vec(bytes);
             take((first << MAX_SAMPLE_BITS) as u32, &samples);
         })

@@ -1,7 +1,5 @@
 //! The integrators that are made of paths: global illumination, direct light, the ground truth of ambient occlusion, and views of surfaces.
 
-use std::sync::Arc;
-
 use super::ambient::{Ambient, EnvironmentLight};
 use super::report::{self, environment_text};
 use super::{PathOptions, Strategy, TextureFilter, View, render, streams};
@@ -10,7 +8,6 @@ use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
@@ -223,7 +220,7 @@ impl Integrator for PathVariant {
         let black = !self.shows_environment(job.scene);
         let settings = &job.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
-        black && is_pinhole && job.pixel_filter.is_within_pixel()
+        black && is_pinhole && job.samples.pixel_filter.is_within_pixel()
     }
 
     fn shows_environment(&self, scene: &Scene) -> bool {
@@ -249,15 +246,8 @@ impl Integrator for PathVariant {
         identity
     }
 
-    fn render(
-        &self,
-        tracer: &Tracer,
-        flat: &FlatScene,
-        job: &RenderJob,
-        tile_mask: Option<Arc<TileMask>>,
-        control: &mut dyn Control,
-    ) -> Result<Rendered> {
-        let options = PathOptions { tile_mask, ..self.options(job)? };
+    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered> {
+        let options = self.options(job)?;
         let result = render(tracer, flat, &job.camera_record(flat), &options, control)?;
         let report = report::report(tracer, flat, job, &options, &result);
         Ok(Rendered { image: result.image, report, ..Default::default() })

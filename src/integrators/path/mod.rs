@@ -7,9 +7,11 @@
 
 pub mod ambient;
 mod ambient_light;
+mod buffers;
 mod environment;
 mod features;
 pub mod kinds;
+mod light_sources;
 mod light_tree;
 mod lights;
 mod media;
@@ -24,26 +26,25 @@ use glam::DMat3;
 
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
-use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
+use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
+use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Specialization, Timing};
-use crate::interface::records::path::SignalRecord;
-use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
+use crate::interface::{LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
-use crate::scene::{Environment, Scene};
+use crate::scene::Scene;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::queue::RayQueue;
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
+use buffers::{AMBIENT_COUNT, COUNTS, DISTANT_COUNT, FirstSurfaceRays, PathBuffers};
 use environment::DeviceEnvironment;
+use light_sources::LightSources;
+use lights::LightBuilder;
 use lights::device::DeviceLights;
-use lights::{LightBuilder, Lights};
 use media::ClosedVolumes;
-use params::{
-    CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SHARE_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES,
-};
+use params::{PathParams, QUAD_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Minimum number of bounces per submission, after which the host reads how many paths are left.
@@ -95,7 +96,7 @@ pub fn render(
     options: &PathOptions,
     control: &mut dyn Control,
 ) -> Result<PathResult> {
-    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.spp, options.seed, control)
+    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.samples.spp, options.samples.seed, control)
 }
 
 /// Renders one scene repeatedly: lights, environment, queues and pipelines are created once.
@@ -105,12 +106,13 @@ pub struct PathIntegrator {
 }
 
 impl PathIntegrator {
-    /// Creates it for images of at most `options.spp` paths per pixel. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
+    /// Creates it for images of at most `options.samples.spp` paths per pixel. The tracer must have
+    /// been built from `flat` with [`crate::tracer::Needs::shading`].
     ///
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        let capacity = max_rays(launch_rays(&tracer.device().info), options.size, options.spp, MAX_SAMPLE_BITS);
+        let capacity = max_rays(launch_rays(&tracer.device().info), options.samples.size, options.samples.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
@@ -137,8 +139,8 @@ impl PathIntegrator {
 
     /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
     ///
-    /// # Errors
-    /// Those of the device; [`Error::Usage`] for more paths than `options.spp`; [`crate::Error::Interrupted`] when `control` says so.
+    /// # Errors Those of the device; [`Error::Usage`] for more paths than `options.samples.spp`;
+    /// [`crate::Error::Interrupted`] when `control` says so.
     pub fn render(
         &mut self,
         tracer: &Tracer,
@@ -149,23 +151,16 @@ impl PathIntegrator {
     ) -> Result<PathResult> {
         let Self { paths, options } = self;
         paths.find_camera_media(camera)?;
-        if spp > options.spp {
-            return Err(Error::Usage(format!("{spp} paths per pixel: the integrator was created for at most {}", options.spp)));
+        if spp > options.samples.spp {
+            return Err(Error::Usage(format!(
+                "{spp} paths per pixel: the integrator was created for at most {}",
+                options.samples.spp
+            )));
         }
-        let plan = Plan {
-            size: options.size,
-            spp,
-            seed,
-            time_limit: options.time_limit,
-            tile_mask: options.tile_mask.as_deref(),
-            film: &options.film,
-        };
+        let samples = SampleSettings { spp, seed, ..options.samples.clone() };
         paths.traced = PathCounts::default();
-        let params = BlockParams {
-            pixel_filter: options.pixel_filter as u32,
-            ..options.ambient.map(|a| a.block_params()).unwrap_or_default()
-        };
-        let image = accumulate(tracer, camera, &plan, &params, paths, control)?;
+        let params = options.ambient.map(|a| a.block_params()).unwrap_or_default();
+        let image = accumulate(tracer, camera, &samples, &params, paths, control)?;
         let PathCounts { bounce_rays, shadow_rays, ambient_rays, longest_path } = paths.traced;
         Ok(PathResult {
             image,
@@ -190,21 +185,6 @@ struct PathCounts {
     longest_path: u32,
 }
 
-/// Words of [`PathEstimator::counts`] for each vertex: numbers of rays, of shadow rays, of rays of ambient light, and of shadow rays to distant lights alone.
-const COUNTS: u32 = 4;
-const AMBIENT_COUNT: u32 = 2;
-const DISTANT_COUNT: u32 = 3;
-
-/// Resources of rays of a path's first surface beside the shadow rays of all of them: occlusion rays of ambient light, and shadow rays to distant lights where each
-/// group of lights is sampled. They are traced as shadow rays are, from a queue of their own: two rays that add to a path at the same time would depend on their order.
-struct FirstSurfaceRays {
-    queue: RayQueue,
-    /// Index of the parameters with which they are traced.
-    params: usize,
-    /// Word of [`PathEstimator::counts`] in which their number is read back.
-    count: u32,
-}
-
 /// Resources of shadow rays that pass straight through thin walls.
 struct TransmittedShadowRays {
     stream: Stream,
@@ -214,18 +194,21 @@ struct TransmittedShadowRays {
     count: Buffer,
 }
 
-struct PathEstimator {
+/// Streams and pipelines of all launches.
+struct PathPipelines {
     camera: Stream,
     /// The same for camera rays that another pass has traced; `None` where each path has its own.
     known: Option<Stream>,
-    /// The launches that follow begin at known hits ([`BlockParams::known_hits`]).
-    begins_at_known: bool,
     bounce: Stream,
     shadow: Stream,
     resolve: ComputePipeline,
-    /// The queues of bounces: one is traced while the other is filled.
-    queues: [RayQueue; 2],
-    shadow_queue: RayQueue,
+}
+
+struct PathEstimator {
+    pipelines: PathPipelines,
+    /// The launches that follow begin at known hits ([`BlockParams::known_hits`]).
+    begins_at_known: bool,
+    buffers: PathBuffers,
     /// Parameters for filling either queue of bounces; then those for tracing either queue of shadow rays behind walls.
     /// Each has the parameters of the block, and behind them those of paths.
     block_params: Vec<Buffer>,
@@ -247,201 +230,106 @@ struct PathEstimator {
     light_builder: Option<LightBuilder>,
     features: PathFeatures,
     light_kinds: LightKinds,
-    /// Radiance of each path of a launch.
-    radiance: Buffer,
-    _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
+}
+
+impl TransmittedShadowRays {
+    /// For launches of at most `most` paths.
+    fn new(tracer: &Tracer, constants: &Specialization, most: u32) -> Result<Self> {
+        let device = tracer.device();
+        let bytes = QUAD_BYTES * u64::from(most);
+        Ok(Self {
+            stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, constants)?,
+            later: RayQueue::new(device, most)?,
+            contributions: Buffer::new(device, "transmitted shadow ray contributions", bytes, Memory::Device)?,
+            count: Buffer::new(device, "number of transmitted shadow rays", 4, Memory::Readback)?,
+        })
+    }
+}
+
+impl PathPipelines {
+    /// Compiles them. `has_known_hits`: paths may begin at camera rays that another pass has
+    /// traced.
+    fn new(tracer: &Tracer, constants: &Specialization, has_known_hits: bool) -> Result<Self> {
+        let known = || tracer.with_known_hits(&shaders::PATH_CAMERA_CLOSEST, constants);
+        Ok(Self {
+            camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, constants)?,
+            known: has_known_hits.then(known).transpose()?,
+            bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, constants)?,
+            shadow: tracer.stream(&shaders::PATH_SHADOW_ANY)?,
+            resolve: shaders::PATH_RESOLVE.pipeline(tracer.device())?,
+        })
+    }
+}
+
+/// Checks that the tracer has the data that paths of these options need: without it the image would
+/// be wrong without any error. Returns true if textures are filtered by ray cones.
+fn check_tracer(tracer: &Tracer, options: &PathOptions) -> Result<bool> {
+    let Some(shading) = tracer.features().shading else {
+        return Err(Error::Usage("path tracing needs a tracer that was built with Needs::shading".into()));
+    };
+    if shading.materials.contains(MaterialFeature::White) && options.white_sky.is_none() {
+        return Err(Error::Usage(
+            "a tracer that was built with Needs::white has no materials, which paths need without a white sky".into(),
+        ));
+    }
+    let cones = options.texture_filter == TextureFilter::RayCone && options.white_sky.is_none();
+    if cones && !shading.materials.contains(MaterialFeature::RayCones) {
+        return Err(Error::Usage("ray cones need a tracer that was built with Needs::mip_levels".into()));
+    }
+    Ok(cones)
+}
+
+/// Uploads the parameters of launches, each behind room for those of a block.
+fn upload_params(device: &Arc<Device>, records: &[PathParams]) -> Result<Vec<Buffer>> {
+    let size = PARAMS_BYTES + size_of::<PathParams>() as u64;
+    let upload = |record| {
+        let mut buffer = Buffer::new(device, "block parameters", size, Memory::Upload)?;
+        buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
+        Ok(buffer)
+    };
+    records.iter().map(upload).collect()
 }
 
 impl PathEstimator {
     /// For launches of at most `most` paths. With `has_signal` the diffuse part of radiance is kept apart ([`signal`]).
     fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, most: u32, has_signal: bool) -> Result<Self> {
         let device = tracer.device();
-        // without this data the image would be wrong without any error
-        let Some(shading) = tracer.features().shading else {
-            return Err(Error::Usage("path tracing needs a tracer that was built with Needs::shading".into()));
-        };
-        if shading.materials.contains(MaterialFeature::White) && options.white_sky.is_none() {
-            return Err(Error::Usage(
-                "a tracer that was built with Needs::white has no materials, which paths need without a white sky".into(),
-            ));
-        }
-        let cones = options.texture_filter == TextureFilter::RayCone && options.white_sky.is_none();
-        if cones && !shading.materials.contains(MaterialFeature::RayCones) {
-            return Err(Error::Usage("ray cones need a tracer that was built with Needs::mip_levels".into()));
-        }
-        let white = Environment::Uniform(glam::Vec3::ONE);
-        let around = match options.view {
-            // a view shows surfaces, independent of lights
-            Some(_) => &Environment::Black,
-            None if options.white_sky.is_some() => &white,
-            None => &flat.scene.environment,
-        };
-        let environment = DeviceEnvironment::new(device, around, options.strategy == Strategy::Mis)?;
-        let mut builder = None;
-        let lights = match options.white_sky {
-            _ if options.view.is_some() => Lights::default(),
-            Some(_) => Lights::environment_only(),
-            None => {
-                let around = if options.background_only { glam::Vec3::ZERO } else { environment.mean };
-                builder.insert(LightBuilder::new(flat, around)).lights(flat.scene)
-            }
-        };
-        let (mut features, mut light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
-        if let Some(builder) = builder.as_ref().filter(|_| features.contains(PathFeature::LightSamples)) {
-            builder.moving_kinds(flat.scene).for_each(|kind| light_kinds.insert(kind));
-        }
+        let cones = check_tracer(tracer, options)?;
+
+        // lights, and what shaders must know of them
+        let sources = LightSources::new(device, flat, options)?;
+        let (mut features, light_kinds) = sources.features(flat, options, cones);
         features.insert_if(has_signal, PathFeature::Signal);
-        let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
-        let stores_sky_pdfs = features.contains(PathFeature::LightSamples)
-            && lights.environment.is_some()
-            && (environment.map.texels == 0 || light_kinds.contains(LightKind::Portal));
-        let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
-        let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
-        let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
-        let shadow_queue = RayQueue::new(device, most)?;
-        let (radiance, contributions) = (quads("radiance of paths")?, quads("shadow ray contributions")?);
-        let ambient_queue = options.ambient.map(|_| RayQueue::new(device, most)).transpose()?;
-        let splits = features.contains(PathFeature::LightSplit);
-        let distant_queue = splits.then(|| RayQueue::new(device, most)).transpose()?;
-        let states = || Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device);
-        let mut buffers = Vec::new();
-        let mut keep = |buffer: Buffer| {
-            let address = buffer.address();
-            buffers.push(buffer);
-            address
-        };
-        let mut diffuse_part = |is_needed: bool| match has_signal && is_needed {
-            true => quads("diffuse part of contributions").map(&mut keep),
-            false => Ok(0),
-        };
-        let diffuse_contributions = diffuse_part(true)?;
-        let later_diffuse_contributions = diffuse_part(has_clear_walls)?;
-        let ambient_diffuse_contributions = diffuse_part(options.ambient.is_some())?;
-        let distant_diffuse_contributions = diffuse_part(splits)?;
-        let signal_bytes = size_of::<SignalRecord>() as u64 * u64::from(most);
+        let stores_sky_pdfs = sources.needs_sky_pdfs(features, light_kinds);
+        let LightSources { environment, lights, builder } = sources;
         let lights = DeviceLights::new(device, lights)?;
-        let base = PathParams {
-            map: environment.map,
-            environment: environment.factor.to_array(),
-            radiance: radiance.address(),
-            contributions: keep(contributions),
-            shadow: shadow_queue.record(),
-            cones: match cones {
-                true => keep(Buffer::new(device, "ray cones", CONE_BYTES * most as u64, Memory::Device)?),
-                false => 0,
-            },
-            media: match has_media {
-                true => keep(Buffer::new(device, "media stacks", MEDIA_BYTES * most as u64, Memory::Device)?),
-                false => 0,
-            },
-            straight: match has_clear_walls {
-                true => keep(Buffer::new(device, "straight path lengths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
-                false => 0,
-            },
-            sky_pdfs: match stores_sky_pdfs {
-                true => keep(Buffer::new(device, "environment densities", SKY_PDF_BYTES * most as u64, Memory::Device)?),
-                false => 0,
-            },
-            placed_shares: match features.contains(PathFeature::LightGroups) {
-                true => keep(Buffer::new(device, "shares of placed lights", SHARE_BYTES * most as u64, Memory::Device)?),
-                false => 0,
-            },
-            distant_shadow: distant_queue.as_ref().map(RayQueue::record).unwrap_or_default(),
-            distant_contributions: match splits {
-                true => keep(quads("contributions of distant lights")?),
-                false => 0,
-            },
-            distant_diffuse_contributions,
-            camera_media: [INVALID; 4],
-            ambient: ambient_queue.as_ref().map(RayQueue::record).unwrap_or_default(),
-            ambient_contributions: match &ambient_queue {
-                Some(_) => keep(quads("contributions of ambient light")?),
-                None => 0,
-            },
-            signals: match has_signal {
-                true => keep(Buffer::new(device, "signals of paths", signal_bytes, Memory::Device)?),
-                false => 0,
-            },
-            diffuse_contributions,
-            later_diffuse_contributions,
-            ambient_diffuse_contributions,
-            ..lights.params(options.params())
-        };
-        let states = [keep(states()?), keep(states()?)];
         let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
-        let walls = match has_clear_walls && samples_lights {
-            true => Some(TransmittedShadowRays {
-                stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
-                later: RayQueue::new(device, most)?,
-                contributions: quads("transmitted shadow ray contributions")?,
-                count: Buffer::new(device, "number of transmitted shadow rays", 4, Memory::Readback)?,
-            }),
-            false => None,
-        };
-        // parameters k fill queue k, and read the state of the other
-        let of_bounces = |k: usize| {
-            let (next, tags) = (queues[k].record(), queues[k ^ 1].record().tags);
-            PathParams { next, tags, states: states[k ^ 1], next_states: states[k], ..base }
-        };
-        let mut records = vec![of_bounces(0), of_bounces(1)];
-        // shadow rays move from one queue to the other at each wall
-        if let Some(w) = &walls {
-            let (later, later_contributions) = (w.later.record(), w.contributions.address());
-            records.push(PathParams { later, later_contributions, ..base });
-            records.push(PathParams {
-                shadow: later,
-                contributions: later_contributions,
-                diffuse_contributions: base.later_diffuse_contributions,
-                later: base.shadow,
-                later_contributions: base.contributions,
-                later_diffuse_contributions: base.diffuse_contributions,
-                ..base
-            });
-        }
-        let mut of_first_surface = Vec::new();
-        if let Some(queue) = ambient_queue {
-            of_first_surface.push(FirstSurfaceRays { queue, params: records.len(), count: AMBIENT_COUNT });
-            records.push(PathParams {
-                shadow: base.ambient,
-                contributions: base.ambient_contributions,
-                diffuse_contributions: base.ambient_diffuse_contributions,
-                ..base
-            });
-        }
-        if let Some(queue) = distant_queue {
-            of_first_surface.push(FirstSurfaceRays { queue, params: records.len(), count: DISTANT_COUNT });
-            records.push(PathParams {
-                shadow: base.distant_shadow,
-                contributions: base.distant_contributions,
-                diffuse_contributions: base.distant_diffuse_contributions,
-                ..base
-            });
-        }
-        let block_params = records.iter().map(|record| {
-            let mut buffer =
-                Buffer::new(device, "block parameters", PARAMS_BYTES + size_of::<PathParams>() as u64, Memory::Upload)?;
-            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
-            Ok(buffer)
-        });
-        let block_params = block_params.collect::<Result<Vec<_>>>()?;
+
+        // buffers
+        let base =
+            PathParams { map: environment.map, environment: environment.factor.to_array(), ..lights.params(options.params()) };
+        let (mut buffers, base) = PathBuffers::new(device, most, features, stores_sky_pdfs, base)?;
+        let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
+        let transmits = samples_lights && features.contains(PathFeature::ClearWalls);
+        let walls = transmits.then(|| TransmittedShadowRays::new(tracer, &constants, most)).transpose()?;
+        let behind_walls = walls.as_ref().map(|w| (w.later.record(), w.contributions.address()));
+        let (records, of_first_surface) = buffers.launch_params(behind_walls, base);
+        let block_params = upload_params(device, &records)?;
+
+        // pipelines
+        let shares_camera_rays = !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens);
+        let pipelines = PathPipelines::new(tracer, &constants, has_signal && shares_camera_rays)?;
+
         Ok(Self {
-            camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, &constants)?,
-            known: match has_signal && !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens) {
-                true => Some(tracer.with_known_hits(&shaders::PATH_CAMERA_CLOSEST, &constants)?),
-                false => None,
-            },
+            pipelines,
             begins_at_known: false,
-            bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, &constants)?,
-            shadow: tracer.stream(&shaders::PATH_SHADOW_ANY)?,
-            resolve: shaders::PATH_RESOLVE.pipeline(device)?,
-            queues,
-            shadow_queue,
+            buffers,
             block_params,
             records,
             walls,
             of_first_surface,
-            volumes: has_media.then(|| ClosedVolumes::new(flat)),
+            volumes: features.contains(PathFeature::Media).then(|| ClosedVolumes::new(flat)),
             counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?,
             max_depth: options.bounces(),
             samples_lights,
@@ -451,8 +339,6 @@ impl PathEstimator {
             light_builder: builder,
             features,
             light_kinds,
-            radiance,
-            _buffers: buffers,
             _environment: environment,
         })
     }
@@ -528,18 +414,18 @@ impl PathEstimator {
         }
         r.barrier();
         match &self.walls {
-            None => self.shadow.record(r, &self.shadow_queue.push(push, most)),
+            None => self.pipelines.shadow.record(r, &self.buffers.shadow_queue.push(push, most)),
             Some(walls) => {
                 walls.later.clear(r);
                 r.barrier();
                 let push = Push { pass: self.block_params[2].address(), ..push };
-                walls.stream.record(r, &self.shadow_queue.push(push, most));
+                walls.stream.record(r, &self.buffers.shadow_queue.push(push, most));
                 r.barrier();
                 r.copy(walls.later.count(), 0, &walls.count, 0, 4);
             }
         }
         r.barrier();
-        r.copy(self.shadow_queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 1), 4);
+        r.copy(self.buffers.shadow_queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 1), 4);
     }
 
     /// Records the rays of first surfaces that a vertex generated; their number is read back from `slot`.
@@ -547,7 +433,7 @@ impl PathEstimator {
         for FirstSurfaceRays { queue, params, count } in &self.of_first_surface {
             r.barrier();
             let push = Push { pass: self.block_params[*params].address(), ..push };
-            self.shadow.record(r, &queue.push(push, most));
+            self.pipelines.shadow.record(r, &queue.push(push, most));
             r.barrier();
             r.copy(queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + count), 4);
         }
@@ -555,7 +441,7 @@ impl PathEstimator {
 
     /// Empties the queues of the rays that a vertex leaves for lights.
     fn clear_light_queues(&self, r: &mut crate::gpu::Recorder) {
-        self.shadow_queue.clear(r);
+        self.buffers.shadow_queue.clear(r);
         self.of_first_surface.iter().for_each(|rays| rays.queue.clear(r));
     }
 
@@ -563,7 +449,7 @@ impl PathEstimator {
     fn trace_behind_walls(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         let Some(walls) = self.walls.as_ref().filter(|_| self.samples_lights) else { return Ok(timings) };
-        let queues = [&self.shadow_queue, &walls.later];
+        let queues = [&self.buffers.shadow_queue, &walls.later];
         // the shadow rays of vertices went from the first queue to the second
         let mut from = 1;
         loop {
@@ -588,7 +474,9 @@ impl PathEstimator {
     fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let resolved = Push { pass: self.block_params[0].address(), ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
-        self.trace(commands, push, |paths, r| r.timed("path_resolve", |r| r.dispatch(&paths.resolve, &resolved, groups)))
+        self.trace(commands, push, |paths, r| {
+            r.timed("path_resolve", |r| r.dispatch(&paths.pipelines.resolve, &resolved, groups))
+        })
     }
 
     /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with thin walls that transmit, one. Then records `finish`, which reads the paths.
@@ -614,10 +502,15 @@ impl PathEstimator {
             timings.extend(commands.run(|r| {
                 r.fill(&self.counts, self.counts.size(), 0);
                 if !started {
-                    self.queues[0].clear(r);
+                    self.buffers.queues[0].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    self.known.as_ref().filter(|_| self.begins_at_known).unwrap_or(&self.camera).record(r, &push(0));
+                    self.pipelines
+                        .known
+                        .as_ref()
+                        .filter(|_| self.begins_at_known)
+                        .unwrap_or(&self.pipelines.camera)
+                        .record(r, &push(0));
                     self.record_shadow(r, push(0), left, MAX_BOUNCES);
                     self.record_first_surface(r, push(0), left, MAX_BOUNCES);
                 }
@@ -626,11 +519,11 @@ impl PathEstimator {
                     depth += 1;
                     let (fills, traced) = (depth as usize % 2, (depth as usize + 1) % 2);
                     r.barrier();
-                    self.queues[fills].clear(r);
+                    self.buffers.queues[fills].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    self.bounce.record(r, &self.queues[traced].push(push(fills), left));
-                    r.copy(self.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * slot), 4);
+                    self.pipelines.bounce.record(r, &self.buffers.queues[traced].push(push(fills), left));
+                    r.copy(self.buffers.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * slot), 4);
                     self.record_shadow(r, push(fills), left, slot);
                     // what lies behind surfaces that paths pass straight through is a first surface, too
                     if straight {
@@ -639,7 +532,13 @@ impl PathEstimator {
                 }
                 r.barrier();
                 // number of rays that are left for the next submission
-                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 4 * u64::from(COUNTS * MAX_BOUNCES), 4);
+                r.copy(
+                    self.buffers.queues[depth as usize % 2].count(),
+                    0,
+                    &self.counts,
+                    4 * u64::from(COUNTS * MAX_BOUNCES),
+                    4,
+                );
                 if finishes {
                     finish(self, r);
                 }

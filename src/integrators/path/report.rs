@@ -106,7 +106,7 @@ fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec
     if not_finite > 0 {
         warnings.push(format!(
             "{not_finite} of {} samples were not finite and were ignored: please report this scene",
-            u64::from(spp) * u64::from(o.size[0]) * u64::from(o.size[1])
+            u64::from(spp) * u64::from(o.samples.size[0]) * u64::from(o.samples.size[1])
         ));
     }
     let scene = flat.scene;

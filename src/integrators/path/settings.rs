@@ -3,9 +3,6 @@
 //! they require, and their metadata and JSON record. An option that is a number in shaders is also
 //! a field of [`PathOptionsRecord`].
 
-use std::sync::Arc;
-use std::time::Duration;
-
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
@@ -13,8 +10,7 @@ use super::ambient::{Ambient, EnvironmentLight, OccludedLight};
 use super::params::PathParams;
 use super::{PixelFilter, View};
 use crate::error::{Error, Result};
-use crate::film::schedule::FilmOptions;
-use crate::film::tile_mask::TileMask;
+use crate::film::SampleSettings;
 use crate::integrators::RenderJob;
 use crate::interface::{PathFeature, PathOptionsRecord};
 use crate::scene::Projection;
@@ -133,12 +129,9 @@ settings! {
 /// Options of a path-traced image.
 #[derive(Clone, Debug)]
 pub struct PathOptions {
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Paths per pixel.
-    pub spp: u32,
-    /// Seed of the sampler.
-    pub seed: u32,
+    /// Settings of samples, of one path each. A tile mask needs a black environment and
+    /// [`PathOptions::is_sharp`].
+    pub samples: SampleSettings,
     /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most
     /// [`MAX_DEPTH`].
     pub max_depth: u32,
@@ -156,19 +149,10 @@ pub struct PathOptions {
     pub background_only: bool,
     /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
     pub view: Option<View>,
-    /// Pixel reconstruction filter.
-    pub pixel_filter: PixelFilter,
     /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
     pub texture_filter: TextureFilter,
     /// Thin lens of a perspective camera; `None`: a pinhole.
     pub lens: Option<Lens>,
-    /// Stop after this time and keep the image so far.
-    pub time_limit: Option<Duration>,
-    /// Tiles of the image that show geometry; only if the environment is black and
-    /// [`PathOptions::is_sharp`].
-    pub tile_mask: Option<Arc<TileMask>>,
-    /// The film to resume, and when to save it.
-    pub film: FilmOptions,
     /// Minimum number of bounces: shorter paths are left out.
     pub min_depth: u32,
     /// Bounces before Russian roulette may end a path.
@@ -182,9 +166,7 @@ pub struct PathOptions {
 impl Default for PathOptions {
     fn default() -> Self {
         Self {
-            size: [1280, 720],
-            spp: 16,
-            seed: 0,
+            samples: SampleSettings::default(),
             max_depth: MAX_DEPTH,
             strategy: Strategy::Mis,
             specular_only: false,
@@ -192,12 +174,8 @@ impl Default for PathOptions {
             ambient: None,
             background_only: false,
             view: None,
-            pixel_filter: PixelFilter::Box,
             texture_filter: TextureFilter::Bilinear,
             lens: None,
-            time_limit: None,
-            tile_mask: None,
-            film: FilmOptions::default(),
             min_depth: 0,
             rr_depth: 5,
             firefly_clamp: f32::INFINITY,
@@ -229,12 +207,8 @@ impl PathOptions {
     fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
         // without `..`, so that a new option must be added here
         let Self {
-            size: _,
-            spp: _,
-            time_limit: _,
-            tile_mask: _,
-            film: _,
-            seed: _,
+            samples:
+                SampleSettings { size: _, spp: _, seed: _, pixel_filter, time_limit: _, keep_rays: _, tile_mask: _, film: _ },
             max_depth,
             min_depth,
             rr_depth,
@@ -246,7 +220,6 @@ impl PathOptions {
             background_only,
             view,
             specular_only: _,
-            pixel_filter,
             texture_filter,
             lens,
         } = self;
@@ -346,20 +319,21 @@ impl PathOptions {
     pub(super) fn new(job: &RenderJob) -> Result<Self> {
         let settings = &job.settings.path;
         let mut options = Self {
-            size: job.size,
-            spp: job.spp,
-            seed: job.seed,
+            samples: job.samples.clone(),
             max_depth: settings.max_depth.or(job.scene.hints.max_depth).unwrap_or(MAX_DEPTH),
             strategy: settings.sampling.unwrap_or_default(),
-            pixel_filter: job.pixel_filter,
             texture_filter: settings.texture_filter.unwrap_or_default(),
             lens: settings.lens(job.camera.projection)?,
-            time_limit: job.time_limit,
-            film: job.film.clone(),
             ..Self::default()
         };
         options.set_numbers(settings);
         Ok(options)
+    }
+
+    /// The same options with changed settings of samples.
+    pub fn with_samples(mut self, change: impl FnOnce(&mut SampleSettings)) -> Self {
+        change(&mut self.samples);
+        self
     }
 
     /// Metadata keys and values by which a film is known to be of the same render. `None`: the key
@@ -381,7 +355,7 @@ impl PathOptions {
             (PathFeature::BackgroundOnly, self.background_only),
             (PathFeature::View, self.view.is_some()),
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
-            (PathFeature::PixelFilter, self.pixel_filter != PixelFilter::Box),
+            (PathFeature::PixelFilter, self.samples.pixel_filter != PixelFilter::Box),
         ]);
         features
     }
@@ -427,7 +401,7 @@ impl PathOptions {
 
     /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
     pub fn is_sharp(&self) -> bool {
-        self.pixel_filter.is_within_pixel() && self.lens.is_none()
+        self.samples.pixel_filter.is_within_pixel() && self.lens.is_none()
     }
 }
 

@@ -123,7 +123,7 @@ impl SignalPaths {
 
     /// Returns true if paths can begin at [`BlockParams::known_hits`]. They cannot where each has a camera ray of its own: through a lens, or through surfaces of stochastic alpha.
     pub fn can_begin_at_known(&self) -> bool {
-        self.paths.known.is_some()
+        self.paths.pipelines.known.is_some()
     }
 
     /// Begins a frame: the camera and its block, with [`BlockParams::frame`], [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE` for samples that all lie

@@ -13,7 +13,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::film::state::FilmState;
 use crate::film::tile_mask::TileMask;
-use crate::film::{Control, Film};
+use crate::film::{Control, Film, SampleSettings};
 use crate::gpu::Timing;
 use crate::integrators::aov::Aov;
 use crate::integrators::{Integrator, RenderJob};
@@ -261,14 +261,15 @@ impl View {
                 if !rests {
                     view.restart();
                 }
-                let job = RenderJob {
+                let mut job = self.settings.job(session.scene, camera);
+                job.samples = SampleSettings {
                     size: self.size,
                     spp: MAX_SPP,
                     time_limit: Some(time),
                     film: FilmOptions { start: view.state.clone(), keep_state: true, ..Default::default() },
-                    ..self.settings.job(session.scene, camera)
+                    ..job.samples
                 };
-                view.step(world, &job, control)
+                view.step(world, job, control)
             }
         }
     }
@@ -405,12 +406,11 @@ impl StillView {
         (self.state, self.tile_mask) = (None, None);
     }
 
-    fn step(&mut self, world: &TracedScene, job: &RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
-        let skips = self.integrator.skips_empty_tiles(job);
+    fn step(&mut self, world: &TracedScene, mut job: RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
         let record = job.camera_record(&world.flat);
-        let make = || if skips { TileMask::new(&world.flat, &record, job.size, job.spp).map(Arc::new) } else { None };
-        let tile_mask = self.tile_mask.get_or_insert_with(make).clone();
-        let rendered = match self.integrator.render(&world.tracer, &world.posed(), job, tile_mask, control) {
+        let make = || job.tile_mask(self.integrator, &world.flat, &record);
+        job.samples.tile_mask = self.tile_mask.get_or_insert_with(make).clone();
+        let rendered = match self.integrator.render(&world.tracer, &world.posed(), &job, control) {
             Ok(rendered) => rendered.image,
             Err(e) => {
                 self.restart();
