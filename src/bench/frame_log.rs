@@ -119,7 +119,7 @@ impl FrameLog {
 
 fn cost_of(frames: &[&TimedFrame]) -> FrameCost {
     let ms = |values: &mut dyn Iterator<Item = f64>| {
-        Percentiles::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+        Percentiles::from_values(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
     };
     let mean =
         |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;

@@ -1,6 +1,8 @@
-//! Images or hits in, numbers out: [`comparison`] of two images by all metrics: those of pairs of values ([`metrics`]), [`ssim`], [`flip`] for how different they look, over the pixels of a [`mask`]; [`temporal`] for what of the past is
-//! left in a sequence of them, [`z_test`] for whether noise explains the difference, [`parity`] of two tracers over [`ray_sets`], [`agreement`] of the answers of two; and [`stats`] of what
-//! was measured several times.
+//! Images or hits in, numbers out: [`comparison`] of two images by all metrics: those of pairs of
+//! values ([`metrics`]), [`ssim`], [`flip`] for how different they look, over the pixels of a
+//! [`mask`]; [`temporal`] for what of the past is left in a sequence of them, [`z_test`] for
+//! whether noise explains the difference, [`parity`] of two tracers over [`ray_sets`],
+//! [`agreement`] of the answers of two; and [`stats`] of what was measured several times.
 
 pub mod agreement;
 pub mod comparison;

@@ -74,14 +74,14 @@ fn one(session: &mut AoSession, source: &str) -> Result<StructureRecord> {
             tops.push(1e3 * stats.top_seconds);
         }
     }
-    record.top = Percentiles::of(&tops);
+    record.top = Percentiles::from_values(&tops);
     let poses = poses(&mesh.positions);
     let [refits, rebuilds] = [false, true].map(|rebuild| deform(&mut tracer, &poses, repeats, rebuild));
     let [refits, rebuilds] = [refits?, rebuilds?];
     if rebuilds.is_empty() {
         session.note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
     }
-    (record.refit, record.rebuild) = (Percentiles::of(&refits), Percentiles::of(&rebuilds));
+    (record.refit, record.rebuild) = (Percentiles::from_values(&refits), Percentiles::from_values(&rebuilds));
     Ok(record)
 }
 

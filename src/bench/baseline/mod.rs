@@ -200,7 +200,7 @@ mod tests {
     use crate::measure::stats::Percentiles;
 
     fn result(row: &str, values: &[f64]) -> Measurement {
-        let values = Values::Repeated(Percentiles::of(values).unwrap());
+        let values = Values::Repeated(Percentiles::from_values(values).unwrap());
         Measurement { row: row.into(), quantity: "ms", values, more_is_better: false, is_peers: false }
     }
 

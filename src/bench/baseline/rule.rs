@@ -86,7 +86,7 @@ mod tests {
     }
 
     fn repeated(values: &[f64]) -> Values {
-        Values::Repeated(Percentiles::of(values).unwrap())
+        Values::Repeated(Percentiles::from_values(values).unwrap())
     }
 
     fn of(before: Values, now: Values) -> Judgement {

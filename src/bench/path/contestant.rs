@@ -87,7 +87,7 @@ impl<'a> Contestant<'a> {
                     |squares: f64| if unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) };
                 ErrorPoint {
                     spp: l.spp,
-                    seconds: Summary::of(&l.seconds),
+                    seconds: Summary::from_values(&l.seconds),
                     repeats: l.seconds.clone(),
                     rmse: error(squares),
                     rmse_repeats: l.squares.iter().map(|s| error(*s)).collect(),

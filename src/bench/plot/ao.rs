@@ -72,7 +72,7 @@ fn still_point(r: &TechniqueRecord, reference: f64) -> Option<Point> {
     let still = r.still.as_ref()?;
     let settled = still.settled()?;
     let corrected: Vec<f64> = still.timed_rmse().iter().map(|e| without_reference(*e, reference)).collect();
-    let errors = Percentiles::of(&corrected).filter(|p| p.count > 1);
+    let errors = Percentiles::from_values(&corrected).filter(|p| p.count > 1);
     // where the reference's error is all there is, the preset's own is at most what was measured
     let is_known = settled.errors.rmse_corrected > 0.0;
     let y = if is_known { settled.errors.rmse_corrected } else { settled.errors.rmse };
@@ -225,7 +225,7 @@ mod tests {
         let point = |x: f64, rmse| SeriesPoint {
             x,
             rmse,
-            cost: Some(FrameCost { wall_ms: Percentiles::of(&[x]).unwrap(), ..FrameCost::default() }),
+            cost: Some(FrameCost { wall_ms: Percentiles::from_values(&[x]).unwrap(), ..FrameCost::default() }),
             ..SeriesPoint::default()
         };
         let of = |name: &str, rmse| {

@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn presets_beside_plain_accumulation() {
         let errors = |rmse: f64| FrameErrors { rmse, rmse_corrected: rmse, ..FrameErrors::default() };
-        let cost = |ms: f64| FrameCost { wall_ms: Percentiles::of(&[ms]).unwrap(), ..FrameCost::default() };
+        let cost = |ms: f64| FrameCost { wall_ms: Percentiles::from_values(&[ms]).unwrap(), ..FrameCost::default() };
         let point = |frame, rmse| FramePoint {
             frame,
             errors: errors(rmse),

@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_panel_a_scene_with_its_front() {
         let point = |t: f64, rmse| ErrorPoint {
-            seconds: Summary::of(&[t, 1.1 * t, 1.2 * t]),
+            seconds: Summary::from_values(&[t, 1.1 * t, 1.2 * t]),
             rmse,
             rmse_repeats: vec![0.9 * rmse, rmse, 1.2 * rmse],
             ..ErrorPoint::default()

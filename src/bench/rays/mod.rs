@@ -309,7 +309,7 @@ impl RaySession<'_> {
             }
             let count = runs[k].rays as f64;
             let seconds: Vec<f64> = times[k].iter().map(|l| l.device).collect();
-            let rates = |s: &[f64]| Summary::of(&s.iter().map(|s| count / s / 1e6).collect::<Vec<_>>());
+            let rates = |s: &[f64]| Summary::from_values(&s.iter().map(|s| count / s / 1e6).collect::<Vec<_>>());
             let walls: Option<Vec<f64>> = times[k].iter().map(|l| l.wall).collect();
             let Some(device) = rates(&seconds) else { continue };
             results.push(RunRecord {

@@ -133,7 +133,7 @@ impl AoBenchmark {
                 let row = Row::new("structures", &s.scene).text("pass", what).number("primitives", s.primitives as f64);
                 row.spread("update ms", ms)
             };
-            let once = |ms: f64| Percentiles::of(&[ms]);
+            let once = |ms: f64| Percentiles::from_values(&[ms]);
             rows.push(row("first build", once(s.build_ms)));
             rows.push(row("top level", s.top));
             rows.push(row("mesh refit", s.refit).number("primitives", s.mesh_triangles as f64));

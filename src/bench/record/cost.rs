@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn the_share_of_samples() {
-        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::of(&[ms]).unwrap() };
+        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::from_values(&[ms]).unwrap() };
         let cost = FrameCost {
             passes: vec![pass("path_camera", 1.0), pass("path_bounce", 2.0), pass("filter", 1.0)],
             ..FrameCost::default()

@@ -282,7 +282,7 @@ mod tests {
     use super::*;
 
     fn curve(points: &[(f64, f64)]) -> ContestantRecord {
-        let point = |&(t, rmse): &(f64, f64)| ErrorPoint { seconds: Summary::of(&[t]), rmse, ..ErrorPoint::default() };
+        let point = |&(t, rmse): &(f64, f64)| ErrorPoint { seconds: Summary::from_values(&[t]), rmse, ..ErrorPoint::default() };
         ContestantRecord { name: "x".into(), points: points.iter().map(point).collect(), ..ContestantRecord::default() }
     }
 

@@ -261,7 +261,7 @@ impl RayBenchmark {
                 .map(|(s, _, r)| (s.primitives(), r.device.median))
                 .collect();
             points.sort_by_key(|p| p.0);
-            if let Some(law) = LogScaling::of(&points) {
+            if let Some(law) = LogScaling::from_points(&points) {
                 found.push(ScalingRecord { family: name, stream, contestant, points, law, holds: law.holds() });
             }
         }

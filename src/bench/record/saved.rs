@@ -166,8 +166,11 @@ mod tests {
             ..StillRecord::default()
         };
         let results = vec![TechniqueRecord { preset: "fast".into(), still: Some(still), ..TechniqueRecord::default() }];
-        let result =
-            ChangeResult { half_life: Some(f64::INFINITY), update_ms: Percentiles::of(&[1.0, 2.0]), ..ChangeResult::default() };
+        let result = ChangeResult {
+            half_life: Some(f64::INFINITY),
+            update_ms: Percentiles::from_values(&[1.0, 2.0]),
+            ..ChangeResult::default()
+        };
         let record = AoBenchmark {
             host: HostInfo { cpu: "a processor".into(), threads: 2, ..HostInfo::default() },
             views: vec![ViewRecord { results, ..ViewRecord::default() }],
@@ -180,7 +183,7 @@ mod tests {
         assert!(still.curve[0].errors.rmse.is_nan() && still.curve[0].errors.bias == -0.25 && still.rmse[1].is_nan());
         // infinite is null, and null is unknown
         assert_eq!(read.changes[0].results[0].half_life, None);
-        assert_eq!(read.changes[0].results[0].update_ms, Percentiles::of(&[1.0, 2.0]));
+        assert_eq!(read.changes[0].results[0].update_ms, Percentiles::from_values(&[1.0, 2.0]));
     }
 
     #[test]

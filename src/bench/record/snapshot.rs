@@ -171,7 +171,7 @@ impl Comparable for RayBenchmark {
                     let name = format!("{}, {}, {}", scene.scene, stream.stream, run.contestant);
                     let mut row = Row { results: &mut results, name, is_peers: is_peers(&run.contestant) };
                     let rates: Vec<f64> = run.seconds.iter().map(|s| run.rays as f64 / s / 1e6).collect();
-                    if let Some(rates) = Percentiles::of(&rates).filter(|p| p.median.is_finite()) {
+                    if let Some(rates) = Percentiles::from_values(&rates).filter(|p| p.median.is_finite()) {
                         row.add("Mrays/s", Values::Repeated(rates), true);
                     }
                     row.exact("nodes a ray", run.nodes_per_ray);
@@ -194,9 +194,9 @@ impl Comparable for PathBenchmark {
                 for p in &r.points {
                     let name = format!("{} {}x{}, {}, {} spp", scene.scene, scene.size[0], scene.size[1], r.name, p.spp);
                     let mut row = Row { results: &mut results, name, is_peers: r.engine != OWN };
-                    row.time("seconds an image", Percentiles::of(&p.repeats));
+                    row.time("seconds an image", Percentiles::from_values(&p.repeats));
                     // what is less than the reference's own error says nothing
-                    row.time("RMSE", Percentiles::of(&p.rmse_repeats).filter(|_| !p.unsure));
+                    row.time("RMSE", Percentiles::from_values(&p.rmse_repeats).filter(|_| !p.unsure));
                 }
             }
         }

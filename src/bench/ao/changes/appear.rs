@@ -56,7 +56,7 @@ pub fn play(
         }
         let mut result = result_of(candidate, stage);
         let update = script.to(stage.tracer, 1)?;
-        result.update_ms = Percentiles::of(&[1e3 * (update.mesh_seconds + update.top_seconds)]);
+        result.update_ms = Percentiles::from_values(&[1e3 * (update.mesh_seconds + update.top_seconds)]);
         let old = realtime.result()?;
         let mut images = Vec::new();
         for frame in 0..frames {

@@ -81,7 +81,7 @@ pub fn play(
         result.ghosting = Some(ghosting.energy());
         result.errors = ImageErrors::mean(&errors);
         result.cost = Some(log.cost(first_timed(frames)));
-        result.update_ms = Percentiles::of(&updates);
+        result.update_ms = Percentiles::from_values(&updates);
         record.results.push(result);
     }
     Ok(())
