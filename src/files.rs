@@ -1,9 +1,12 @@
 //! Reading of whole files, atomic file output, and the cache folder.
 //!
-//! Readers say what lies in a file's place where it is not the file itself: a pointer of Git LFS or git-annex, a web page, nothing.
+//! Readers say what lies in a file's place where it is not the file itself: a pointer of Git LFS or
+//! git-annex, a web page, nothing.
 //!
-//! A file is written without a name in the folder of its target, where the system has such files (Linux: `O_TMPFILE`), and gets its name once it is complete: whatever ends
-//! the process, no incomplete file and no temporary file stays. Elsewhere it is written under a name of its own next to its target, and renamed.
+//! A file is written without a name in the folder of its target, where the system has such files
+//! (Linux: `O_TMPFILE`), and gets its name once it is complete: whatever ends the process, no
+//! incomplete file and no temporary file stays. Elsewhere it is written under a name of its own
+//! next to its target, and renamed.
 
 pub mod plan;
 
@@ -24,7 +27,8 @@ const START: u64 = 1024;
 /// Reads a file whole.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that cannot be read, is empty, or holds something else in its place ([`placeholder`]).
+/// [`Error::Input`] for a file that cannot be read, is empty, or holds something else in its place
+/// ([`placeholder`]).
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
     let path = path.as_ref();
     let bytes = read_regular(path).map_err(|e| Error::read(path, &e))?;
@@ -47,7 +51,8 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     }
 }
 
-/// The first bytes of a file, for readers that do not take it whole: enough to tell formats by their signatures.
+/// The first bytes of a file, for readers that do not take it whole: enough to tell formats by
+/// their signatures.
 ///
 /// # Errors
 /// Those of [`read`].
@@ -62,7 +67,8 @@ pub fn read_start(path: impl AsRef<Path>) -> Result<Vec<u8>> {
     }
 }
 
-/// What lies in the place of a file that begins with these bytes, and the remedy, as the end of a sentence; `None` if it may be the file itself.
+/// Says which placeholder begins with these bytes, and the remedy, as the end of a sentence; `None`
+/// if it may be the file itself.
 pub fn placeholder(bytes: &[u8]) -> Option<&'static str> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let begins = |word: &str| text.get(..word.len()).is_some_and(|t| t.eq_ignore_ascii_case(word.as_bytes()));
@@ -79,7 +85,7 @@ pub fn placeholder(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// What a path refers to, and how to write it.
+/// A path's target, which decides how it is written.
 enum Target {
     /// A regular file, existing or new: write next to it, then rename.
     File { path: PathBuf, permissions: Option<Permissions> },
@@ -92,7 +98,8 @@ fn target(path: &Path) -> io::Result<Target> {
         Ok(m) if m.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(m) if !m.is_file() => Ok(Target::Stream),
         Ok(m) => {
-            // renaming would succeed on a write-protected file in a folder of ours: ask the file itself
+            // renaming would succeed on a write-protected file in a folder of ours: ask the file
+            // itself
             OpenOptions::new().write(true).open(path)?;
             // a symbolic link stays; what it points to is replaced
             Ok(Target::File { path: fs::canonicalize(path)?, permissions: Some(m.permissions()) })
@@ -111,7 +118,8 @@ fn target(path: &Path) -> io::Result<Target> {
 /// Most links that are followed one after another, as Linux has it.
 const MAX_LINKS: usize = 40;
 
-/// The path that a name stands for once its own symbolic links are followed, whether there is a file or not.
+/// The path that a name stands for once its own symbolic links are followed, whether there is a
+/// file or not.
 ///
 /// # Errors
 /// More links than a system follows.
@@ -126,7 +134,8 @@ pub fn link_target(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many symbolic links"))
 }
 
-/// Opens a regular file to read. A device, FIFO or socket, which may never end or never answer, is an error at once, and so is a folder.
+/// Opens a regular file to read. A device, FIFO or socket, which may never end or never answer, is
+/// an error at once, and so is a folder.
 ///
 /// # Errors
 /// Those of the system, and [`io::ErrorKind::InvalidInput`] for what is no regular file.
@@ -174,12 +183,14 @@ pub mod probes {
 /// The bytes of a regular file.
 ///
 /// # Errors
-/// Those of [`open_regular`], and [`io::ErrorKind::OutOfMemory`] for a file that is larger than what files may take ([`memory::limit`]).
+/// Those of [`open_regular`], and [`io::ErrorKind::OutOfMemory`] for a file that is larger than
+/// what files may take ([`memory::limit`]).
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     read_up_to(open_regular(path)?, memory::limit(), io::ErrorKind::OutOfMemory)
 }
 
-/// The bytes of a file of at most this size, also where it grows meanwhile; `kind`: the error of a larger one.
+/// The bytes of a file of at most this size, also where it grows meanwhile; `kind`: the error of a
+/// larger one.
 fn read_up_to(file: File, max: u64, kind: io::ErrorKind) -> io::Result<Vec<u8>> {
     let length = file.metadata()?.len();
     let mut bytes = Vec::new();
@@ -209,7 +220,8 @@ pub fn is_own(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| is_owned(&m))
 }
 
-/// Whether what this describes belongs to this process's user or to root; true where files have no owners.
+/// Whether what this describes belongs to this process's user or to root; true where files have no
+/// owners.
 pub fn is_owned(metadata: &fs::Metadata) -> bool {
     #[cfg(target_os = "linux")]
     {
@@ -256,7 +268,8 @@ impl Temporary {
             use std::os::unix::fs::OpenOptionsExt;
             let unnamed = i32::try_from(rustix::fs::OFlags::TMPFILE.bits()).unwrap_or_default();
             let opened = OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
-            // whatever keeps it from being created, a file with a name fails for the same reason, or the file system has only those
+            // whatever keeps it from being created, a file with a name fails for the same reason,
+            // or the file system has only those
             match opened {
                 Ok(file) => return Ok(Self::Unnamed(file)),
                 // what makes the file with a name has no error that says so
@@ -331,8 +344,8 @@ fn named_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     })
 }
 
-/// Checks, before long work starts, that `path` can be written: its folder must exist and accept new files, and an existing
-/// file must be writable (or a device). Leaves no files behind.
+/// Checks, before long work starts, that `path` can be written: its folder must exist and accept
+/// new files, and an existing file must be writable (or a device). Leaves no files behind.
 pub fn check_writable(path: &Path) -> Result<()> {
     let check = || match target(path)? {
         Target::File { path, .. } => Temporary::beside(&path).map(drop),
@@ -341,9 +354,9 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().map_err(|e| Error::write(path, &e))
 }
 
-/// A file that replaces its target once it is complete. An existing file stays until then; dropped without [`AtomicFile::commit`],
-/// it leaves nothing behind. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
-/// receives the bytes on commit.
+/// A file that replaces its target once it is complete. An existing file stays until then; dropped
+/// without [`AtomicFile::commit`], it leaves nothing behind. An existing file keeps its
+/// permissions, a symbolic link stays a link; a device or FIFO receives the bytes on commit.
 #[derive(Debug)]
 pub struct AtomicFile {
     /// The path as the user gave it.
@@ -378,7 +391,8 @@ impl AtomicFile {
         }
     }
 
-    /// Another handle to [`AtomicFile::file`], for writers that own theirs. It has to be flushed before [`AtomicFile::commit`].
+    /// Another handle to [`AtomicFile::file`], for writers that own theirs. It has to be flushed
+    /// before [`AtomicFile::commit`].
     pub fn handle(&mut self) -> Result<File> {
         self.file().try_clone().map_err(|e| self.failed(&e))
     }
@@ -407,14 +421,16 @@ impl AtomicFile {
     }
 }
 
-/// Lets `write` fill an [`AtomicFile`]: on failure nothing is left behind, and an existing file is unchanged.
+/// Lets `write` fill an [`AtomicFile`]: on failure nothing is left behind, and an existing file is
+/// unchanged.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     write(file.file()).map_err(|e| file.failed(&e))?;
     file.commit()
 }
 
-/// Names of files for records in JSON, which is Unicode: bytes of a name that are none are replaced (U+FFFD).
+/// Names of files for records in JSON, which is Unicode: bytes of a name that are none are replaced
+/// (U+FFFD).
 pub fn lossy(paths: &[PathBuf]) -> Vec<Cow<'_, str>> {
     paths.iter().map(|path| path.to_string_lossy()).collect()
 }
@@ -427,8 +443,9 @@ pub fn serialize_lossy<S: serde::Serializer>(path: &Path, serializer: S) -> std:
     serializer.serialize_str(&path.to_string_lossy())
 }
 
-/// The name of a file as metadata of images have it, which may leave this machine: relative to the working directory if it is below it, else without its folders if it is an
-/// absolute path. Other names, such as `builtin:NAME`, stay.
+/// The name of a file as metadata of images have it, which may leave this machine: relative to the
+/// working directory if it is below it, else without its folders if it is an absolute path. Other
+/// names, such as `builtin:NAME`, stay.
 pub fn portable_name(name: &str) -> String {
     let path = Path::new(name);
     if !path.is_absolute() {
@@ -444,13 +461,15 @@ pub fn portable_name(name: &str) -> String {
 /// Variables that name folders of the user.
 const FOLDER_VARIABLES: [&str; 3] = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"];
 
-/// The folder that a variable names; `None` for one that is not set, empty or relative. The XDG Base Directory Specification says to ignore relative paths, which would
-/// put files into whatever folder the program is started in.
+/// The folder that a variable names; `None` for one that is not set, empty or relative. The XDG
+/// Base Directory Specification says to ignore relative paths, which would put files into whatever
+/// folder the program is started in.
 fn user_folder(variable: &str) -> Option<PathBuf> {
     std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute())
 }
 
-/// Variables that name a folder of the user by a relative path, and are ignored for it, with that path.
+/// Variables that name a folder of the user by a relative path, and are ignored for it, with that
+/// path.
 pub fn ignored_user_folders() -> Vec<(&'static str, PathBuf)> {
     let value = |name| std::env::var_os(name).map(|value| (name, PathBuf::from(value)));
     FOLDER_VARIABLES
@@ -460,12 +479,14 @@ pub fn ignored_user_folders() -> Vec<(&'static str, PathBuf)> {
         .collect()
 }
 
-/// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
+/// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either
+/// variable.
 pub fn cache_folder() -> Option<PathBuf> {
     user_folder("XDG_CACHE_HOME").or_else(|| Some(user_folder("HOME")?.join(".cache"))).map(|p| p.join("skylit"))
 }
 
-/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, or `~/.config/skylit`; `None` without either variable.
+/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, or `~/.config/skylit`; `None` without either
+/// variable.
 pub fn config_folder() -> Option<PathBuf> {
     user_folder("XDG_CONFIG_HOME").or_else(|| Some(user_folder("HOME")?.join(".config"))).map(|p| p.join("skylit"))
 }

@@ -1,8 +1,11 @@
-//! Memory that files may take. What is loaded together, a scene or the images of a comparison, shares one [`Budget`], and asks it before memory is taken for what a header
-//! promises: a file of 32 bytes can name an image of a gigabyte, and accessors without data or nodes that share a mesh multiply what little a file holds.
+//! Memory that files may take. What is loaded together, a scene or the images of a comparison,
+//! shares one [`Budget`], and asks it before memory is taken for what a header promises: a file of
+//! 32 bytes can name an image of a gigabyte, and accessors without data or nodes that share a mesh
+//! multiply what little a file holds.
 //!
-//! Unless the user says how much may be taken (`--memory-limit`), it is at most half of the machine's memory, and at most [`FREE`] more than [`PER_BYTE`] times the
-//! bytes that were read: images of one colour, which compress best of all that people use, stay far below.
+//! Unless the user says how much may be taken (`--memory-limit`), it is at most half of the
+//! machine's memory, and at most [`FREE`] more than [`PER_BYTE`] times the bytes that were read:
+//! images of one colour, which compress best of all that people use, stay far below.
 
 #[cfg(target_os = "linux")]
 use std::path::Path;
@@ -16,17 +19,18 @@ use crate::error::{Error, Result};
 const FREE: u64 = 1 << 30;
 /// Bytes that may be taken for each byte that was read.
 const PER_BYTE: u64 = 256;
-/// What is taken for the machine's memory where the system does not tell.
+/// Bytes that are taken for the machine's memory where the system does not tell.
 const UNKNOWN: u64 = 8 << 30;
 
 static LIMIT: OnceLock<u64> = OnceLock::new();
 
-/// Sets how much budgets that are made from now on may give, in bytes, in place of what follows from the machine. The first call counts.
+/// Sets how much budgets that are made from now on may give, in bytes, in place of what follows
+/// from the machine. The first call counts.
 pub fn set_limit(bytes: u64) {
     let _ = LIMIT.set(bytes);
 }
 
-/// What is loaded together.
+/// The memory that files which are loaded together may take.
 #[derive(Debug)]
 pub struct Budget {
     /// Bytes.
@@ -53,13 +57,13 @@ pub fn limit() -> u64 {
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { follows_files: LIMIT.get().is_none(), ..Self::of(limit()) }
+        Self { follows_files: LIMIT.get().is_none(), ..Self::with_limit(limit()) }
     }
 }
 
 impl Budget {
-    /// Bytes, whatever is read.
-    pub fn of(limit: u64) -> Self {
+    /// Creates a budget of `limit` bytes, whatever is read.
+    pub fn with_limit(limit: u64) -> Self {
         Self { limit, follows_files: false, account: Mutex::default() }
     }
 
@@ -69,10 +73,12 @@ impl Budget {
         account.read = account.read.saturating_add(bytes as u64);
     }
 
-    /// Takes bytes for `what`, a noun phrase that begins the sentence of an error. What was taken is not given back: a budget is of one load.
+    /// Takes bytes for `what`, a noun phrase that begins the sentence of an error. What was taken
+    /// is not given back: a budget is of one load.
     ///
     /// # Errors
-    /// Why they are not to be had, as the end of a sentence. [`Budget::check`] says the same, also where this error has become a warning.
+    /// Why they are not to be had, as the end of a sentence. [`Budget::check`] says the same, also
+    /// where this error has become a warning.
     pub fn take(&self, bytes: u64, what: impl FnOnce() -> String) -> Result<(), String> {
         self.take_for_now(bytes, 0, what)
     }
@@ -99,9 +105,10 @@ impl Budget {
         };
         let before = if account.taken > 0 { " with what was loaded before" } else { "" };
         let enough = (all / (1 << 30) + 1).saturating_mul(3 << 29);
-        let remedy = match enough < machine_memory() {
-            true => format!("if that is meant, allow it: --memory-limit {}", size(enough).replace(' ', "")),
-            false => format!("--memory-limit would allow it, but this machine has {}", size(machine_memory())),
+        let remedy = if enough < machine_memory() {
+            format!("if that is meant, allow it: --memory-limit {}", size(enough).replace(' ', ""))
+        } else {
+            format!("--memory-limit would allow it, but this machine has {}", size(machine_memory()))
         };
         let message = format!("takes {}{before}, {reason}; {remedy}", size(all));
         account.refused = Some(format!("{} {message}", what()));
@@ -125,7 +132,8 @@ fn size(bytes: u64) -> String {
     ByteSize(bytes).display().iec().to_string()
 }
 
-/// Bytes that this process can have: the machine's memory, or what its control group or its limit of address space leaves of it.
+/// Bytes that this process can have: the machine's memory, or what its control group or its limit
+/// of address space leaves of it.
 fn machine_memory() -> u64 {
     static MEMORY: OnceLock<u64> = OnceLock::new();
     *MEMORY.get_or_init(|| [physical(), control_group(), address_space()].into_iter().flatten().min().unwrap_or(UNKNOWN))
@@ -144,7 +152,8 @@ fn control_group() -> Option<u64> {
     group_limit(&groups, |file| std::fs::read_to_string(file).ok()?.trim().parse().ok())
 }
 
-/// The smallest limit of a process's control groups and those above them, bytes. `groups`: what /proc/self/cgroup says, of either version (cgroups(7)); `limit` reads a file.
+/// The smallest limit of a process's control groups and those above them, bytes. `groups`: what
+/// /proc/self/cgroup says, of either version (cgroups(7)); `limit` reads a file.
 #[cfg(target_os = "linux")]
 fn group_limit(groups: &str, limit: impl Fn(&Path) -> Option<u64>) -> Option<u64> {
     let smallest = |line: &str| {
@@ -186,7 +195,8 @@ fn address_space() -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Control groups of both versions, and a container whose own group is the root of what it sees.
+    /// Control groups of both versions, and a container whose own group is the root of what it
+    /// sees.
     #[test]
     #[cfg(target_os = "linux")]
     fn limits_of_control_groups() {
@@ -208,7 +218,7 @@ mod tests {
 
     #[test]
     fn memory_follows_what_was_read() {
-        let budget = Budget { follows_files: true, ..Budget::of(1 << 40) };
+        let budget = Budget { follows_files: true, ..Budget::with_limit(1 << 40) };
         assert!(budget.take_for_now(1 << 20, FREE - (1 << 20), || unreachable!()).is_ok());
         assert!(budget.take(FREE - (1 << 20), || unreachable!()).is_ok());
         budget.read(4);
@@ -225,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_limit_that_was_set_counts_alone() {
-        let budget = Budget::of(4 << 30);
+        let budget = Budget::with_limit(4 << 30);
         assert!(budget.take(4 << 30, || unreachable!()).is_ok());
         assert!(budget.take(u64::MAX, || "all".to_owned()).unwrap_err().contains("more than the 4.0 GiB"));
     }

@@ -4,6 +4,8 @@
 
 #[path = "architecture/circles.rs"]
 mod circles;
+#[path = "architecture/voice.rs"]
+mod voice;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -43,6 +45,10 @@ const MAX_CIRCLE: usize = 4;
 
 /// More macros are not declared: rustfmt does not see what they are given, and no search finds it.
 const MAX_MACROS: usize = 20;
+
+/// Rooms whose names, documentation and phases are held to `voice.rs`.
+const VOICED: &[&str] =
+    &["accel", "cli", "files", "gpu", "measure", "memory", "oracle", "sampling", "scene", "terminal", "tracer", "viewer"];
 
 /// No folder holds this share of all lines.
 const MAX_SHARE: f64 = 0.15;
@@ -358,6 +364,18 @@ fn there_are_few_macros() {
     }
     assert!(declared.iter().any(|d| d.contains("settings")), "hardly any macro was found: {declared:?}");
     assert!(declared.len() <= MAX_MACROS, "{} macros:\n{}", declared.len(), declared.join("\n"));
+}
+
+#[test]
+fn the_voice_is_held() {
+    let (mut lapses, mut rooms) = (Vec::new(), BTreeSet::new());
+    for file in files("src", &["rs"]) {
+        let Some(room) = module_of(&file).into_iter().next().filter(|room| VOICED.contains(&room.as_str())) else { continue };
+        voice::check(file.strip_prefix(root()).unwrap(), &std::fs::read_to_string(&file).unwrap(), &mut lapses);
+        rooms.insert(room);
+    }
+    assert_eq!(rooms.len(), VOICED.len(), "a room is missing: {rooms:?}");
+    assert!(lapses.is_empty(), "{} lapses:\n{}", lapses.len(), lapses.join("\n"));
 }
 
 #[test]

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use skylit::film::NoControl;
-use skylit::measure::z_test::{Estimate, Reference, Verdict, ZTest};
+use skylit::measure::z_test::{Estimate, Reference, ZTest, ZTestVerdict};
 use skylit::output::parse_size;
 use skylit::tracer::DeviceSettings;
 use skylit::verify::golden::{Golden, REPLICATES};
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
         let (kind, _) = skylit::tracer::TracerKind::auto(session.info());
         let mut estimates = Vec::new();
         for seed in 0..runs as u32 {
-            estimates.push(Estimate::of(&session.render(&frame, kind, Some(seed), None, &mut NoControl)?)?);
+            estimates.push(Estimate::from_image(&session.render(&frame, kind, Some(seed), None, &mut NoControl)?)?);
         }
         if !changed {
             let golden = Golden::load(&manifest.golden(&frame))?;
@@ -62,12 +62,13 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn compare(image: &Estimate, reference: &Reference) -> Result<Verdict> {
+fn compare(image: &Estimate, reference: &Reference) -> Result<ZTestVerdict> {
     ZTest { false_alarms: RATES[4] }.compare(image, reference)
 }
 
-fn report(name: &str, golden: &str, verdicts: Vec<Verdict>) {
-    let below = |p: fn(&Verdict) -> f64| RATES.map(|r| verdicts.iter().filter(|v| p(v) < r).count().to_string()).join(" | ");
+fn report(name: &str, golden: &str, verdicts: Vec<ZTestVerdict>) {
+    let below =
+        |p: fn(&ZTestVerdict) -> f64| RATES.map(|r| verdicts.iter().filter(|v| p(v) < r).count().to_string()).join(" | ");
     println!("{name} | {golden} | {} | {}", verdicts.len(), below(|v| v.p));
     // of each scale: where alarms come from
     println!("  pixels | | | {}", below(|v| v.extremes[0].p));

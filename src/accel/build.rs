@@ -1,10 +1,12 @@
-//! Building binary trees: from the top down by the surface-area heuristic (`sah.rs`) where time matters most; by obvhs's clustering
-//! and reinsertion (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018)
-//! by default; with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where build time does not matter. docs/traversal.md has the
-//! measurements behind the choice.
+//! Building binary trees: from the top down by the surface-area heuristic (`sah.rs`) where time
+//! matters most; by obvhs's clustering and reinsertion (Meister and Bittner, "Parallel
+//! Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018) by default;
+//! with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where build time does not
+//! matter. docs/traversal.md has the measurements behind the choice.
 //!
-//! The depth of what comes out is bounded, whatever the input: the builders halve where they would go deeper, and a subtree that
-//! reinsertion made too deep is replaced by a balanced one over the same leaves.
+//! The depth of what comes out is bounded, whatever the input: the builders halve where they would
+//! go deeper, and a subtree that reinsertion made too deep is replaced by a balanced one over the
+//! same leaves.
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
@@ -15,7 +17,8 @@ use super::clip::Triangles;
 use super::reinsert::{self, ReinsertionOptions};
 use super::{Aabb, sah, spatial};
 
-/// Maximum depth of a tree: inner nodes on the longest path. A balanced tree over 2^27 primitives needs 27.
+/// Maximum depth of a tree: inner nodes on the longest path. A balanced tree over 2^27 primitives
+/// needs 27.
 pub const MAX_DEPTH: u32 = 48;
 
 /// Trade-off between build time and traversal speed.
@@ -24,7 +27,8 @@ pub const MAX_DEPTH: u32 = 48;
 pub enum BuildPreset {
     /// Least build time: the heuristic alone.
     Fast,
-    /// Clustering and reinsertion where primitives are of uneven size, else the heuristic and reinsertion as far as it pays.
+    /// Clustering and reinsertion where primitives are of uneven size, else the heuristic and
+    /// reinsertion as far as it pays.
     #[default]
     Default,
     /// Spatial splits (up to 30 % more references) and thorough reinsertion.
@@ -32,12 +36,14 @@ pub enum BuildPreset {
 }
 
 impl BuildPreset {
-    /// Chooses a preset for a number of primitives and an expected number of rays. On Sponza `Default` traces faster than
-    /// `Fast` for little more building, on the dragon hardly (docs/traversal.md has the table): with fewer rays than primitives that does not
-    /// pay back, and above ten million primitives the fastest build is used.
+    /// Chooses a preset for a number of primitives and an expected number of rays. On Sponza
+    /// `Default` traces faster than `Fast` for little more building, on the dragon hardly
+    /// (docs/traversal.md has the table): with fewer rays than primitives that does not pay back,
+    /// and above ten million primitives the fastest build is used.
     ///
-    /// Never `Best`: three times the build time for hardly anything on the dragon, and on Sponza for closest hits alone; any hits are
-    /// slower, because a large triangle that is left whole high up in the tree is an occluder that is found early.
+    /// Never `Best`: three times the build time for hardly anything on the dragon, and on Sponza
+    /// for closest hits alone; any hits are slower, because a large triangle that is left whole
+    /// high up in the tree is an occluder that is found early.
     pub fn auto(primitives: usize, rays: u64) -> Self {
         if primitives >= 10_000_000 || rays < primitives as u64 { Self::Fast } else { Self::Default }
     }
@@ -62,9 +68,9 @@ impl obvhs::Boundable for Aabb {
     }
 }
 
-/// Builds a tree over 1 to 2^27 boxes, none empty or NaN. With `collapse`, leaves contain up to that many primitives where
-/// that lowers the SAH cost; otherwise one each. Primitives are never split: `Best` is the heuristic from the top down with
-/// thorough reinsertion.
+/// Builds a tree over 1 to 2^27 boxes, none empty or NaN. With `collapse`, leaves contain up to
+/// that many primitives where that lowers the SAH cost; otherwise one each. Primitives are never
+/// split: `Best` is the heuristic from the top down with thorough reinsertion.
 pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     let mut tree = whole(boxes, preset, 0.0);
     if let Some(max_leaf) = collapse {
@@ -75,8 +81,9 @@ pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 
     tree
 }
 
-/// Builds a tree over primitives with these boxes, each widened by `pad` on all sides. `Best` may split primitives: one may be referenced
-/// by several leaves, whose boxes together contain it and its surroundings up to `pad`. `triangles` gives the triangles of each primitive.
+/// Builds a tree over primitives with these boxes, each widened by `pad` on all sides. `Best` may
+/// split primitives: one may be referenced by several leaves, whose boxes together contain it and
+/// its surroundings up to `pad`. `triangles` gives the triangles of each primitive.
 pub fn tree_with_splits(boxes: &[Aabb], triangles: &impl Triangles, preset: BuildPreset, pad: f32) -> Bvh2 {
     match preset {
         BuildPreset::Fast | BuildPreset::Default => whole(boxes, preset, pad),
@@ -86,8 +93,8 @@ pub fn tree_with_splits(boxes: &[Aabb], triangles: &impl Triangles, preset: Buil
 
 fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     let grow = |b: &Aabb| Aabb { min: b.min - pad, max: b.max + pad };
-    // where sizes are alike, clustering gives no better a tree, for more time; and it pairs one of k equal boxes at a time: k^2
-    // work for a chain of depth k
+    // where sizes are alike, clustering gives no better a tree, for more time; and it pairs one of
+    // k equal boxes at a time: k^2 work for a chain of depth k
     if preset == BuildPreset::Default && boxes.len() > 2 && are_uneven(boxes) && !seems_to_repeat(boxes) {
         let boxes: Vec<Aabb> = boxes.par_iter().map(grow).collect();
         return limit_depth(clustered(&boxes), MAX_DEPTH);
@@ -98,8 +105,9 @@ fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     finish(nodes, boxes.len(), preset)
 }
 
-/// Is the mean surface area of an evenly spaced sample of the boxes more than four times the median? The ratio is high for
-/// architecture (Sponza: 12) and low for scanned surfaces (dragon: 1.4).
+/// Is the mean surface area of an evenly spaced sample of the boxes more than four times the
+/// median? The ratio is high for architecture (Sponza: 12) and low for scanned surfaces (dragon:
+/// 1.4).
 fn are_uneven(boxes: &[Aabb]) -> bool {
     let mut areas: Vec<f32> = boxes.iter().step_by(boxes.len().div_ceil(4096).max(1)).map(Aabb::half_area).collect();
     let mean = areas.iter().map(|&a| f64::from(a)).sum::<f64>() / areas.len() as f64;
@@ -119,7 +127,8 @@ fn clustered(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// Does an evenly spaced sample of the boxes contain duplicates? Duplicates too rare for the sample are too few to matter.
+/// Does an evenly spaced sample of the boxes contain duplicates? Duplicates too rare for the sample
+/// are too few to matter.
 fn seems_to_repeat(boxes: &[Aabb]) -> bool {
     // equal as numbers is equal as bits, once -0 is 0
     let bits = |v: Vec3| (v + 0.0).to_array().map(f32::to_bits);
@@ -132,8 +141,8 @@ fn finish(mut nodes: Vec<Bvh2Node>, primitives: usize, preset: BuildPreset) -> B
     limit_depth(Bvh2 { nodes, primitive_indices: (0..primitives as u32).collect(), ..Default::default() }, MAX_DEPTH)
 }
 
-/// Expected cost of a ray by the surface-area heuristic: nodes that it visits and primitives that it tests, if it hits the root's
-/// box and nothing else (MacDonald and Booth 1990).
+/// Expected cost of a ray by the surface-area heuristic: nodes that it visits and primitives that
+/// it tests, if it hits the root's box and nothing else (MacDonald and Booth 1990).
 #[cfg(test)]
 pub fn cost(tree: &Bvh2) -> f64 {
     let area = |n: &Bvh2Node| node_box(n).half_area() as f64 * n.prim_count.max(1) as f64;
@@ -141,13 +150,16 @@ pub fn cost(tree: &Bvh2) -> f64 {
     all / (node_box(&tree.nodes[0]).half_area() as f64).max(f64::MIN_POSITIVE)
 }
 
-/// Checks a tree against what it was built from: nodes in pairs, each with one parent; every box contains its children's; every
-/// primitive is in a leaf, whole or (where `triangles` are given) in parts that cover it; no deeper than [`MAX_DEPTH`].
+/// Checks a tree against what it was built from: nodes in pairs, each with one parent; every box
+/// contains its children's; every primitive is in a leaf, whole or (where `triangles` are given) in
+/// parts that cover it; no deeper than [`MAX_DEPTH`].
 ///
 /// # Errors
 /// A description of the first defect.
 pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) -> Result<(), String> {
     let mut parts: Vec<Vec<Aabb>> = vec![Vec::new(); boxes.len()];
+
+    // from the root down: each node once, within its parent, its leaves' primitives noted
     let (mut seen, mut work) = (vec![false; tree.nodes.len()], vec![(0usize, None::<Aabb>, 0u32)]);
     while let Some((at, above, depth)) = work.pop() {
         let node = tree.nodes.get(at).ok_or(format!("node {at} is out of range"))?;
@@ -174,9 +186,13 @@ pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) 
             parts.get_mut(p as usize).ok_or(format!("primitive {p} is out of range"))?.push(b);
         }
     }
+
+    // nodes that were never reached belong to no tree
     if let Some(at) = seen.iter().position(|s| !s) {
         return Err(format!("node {at} is in no tree"));
     }
+
+    // leaves may hold parts of a triangle, which together have to cover it
     for (p, (whole, parts)) in boxes.iter().zip(&parts).enumerate() {
         let contained = match (parts.as_slice(), triangles) {
             ([one], _) if one.contains(whole) => true,
@@ -194,7 +210,8 @@ pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) 
     Ok(())
 }
 
-/// Is every point of a lattice on a triangle in one of the boxes? Points are those of exact arithmetic to some 1e-15.
+/// Is every point of a lattice on a triangle in one of the boxes? Points are those of exact
+/// arithmetic to some 1e-15.
 fn is_covered(t: [Vec3; 3], parts: &[Aabb]) -> bool {
     const STEPS: u32 = 12;
     let [a, b, c] = t.map(Vec3::as_dvec3);
@@ -206,7 +223,8 @@ fn is_covered(t: [Vec3; 3], parts: &[Aabb]) -> bool {
     })
 }
 
-/// Rebuilds subtrees so that the tree is no deeper than `most`, which must be at least ceil(log2(leaves)). The leaves stay the same.
+/// Rebuilds subtrees so that the tree is no deeper than `most`, which must be at least
+/// ceil(log2(leaves)). The leaves stay the same.
 pub fn limit_depth(tree: Bvh2, most: u32) -> Bvh2 {
     if depth_of(&tree) <= most {
         return tree;
@@ -216,7 +234,8 @@ pub fn limit_depth(tree: Bvh2, most: u32) -> Bvh2 {
     Bvh2 { nodes, primitive_indices: tree.primitive_indices, ..Default::default() }
 }
 
-/// Nodes of a subtree, each passed through `change` first with its depth. The root has slot 0, children lie side by side.
+/// Nodes of a subtree, each passed through `change` first with its depth. The root has slot 0,
+/// children lie side by side.
 fn emit<'a>(root: Source<'a>, change: impl Fn(Source<'a>, u32) -> Source<'a>) -> Vec<Bvh2Node> {
     let mut nodes = vec![Bvh2Node::default()];
     let mut work = vec![(root, 0u32, 0usize)];
@@ -257,8 +276,9 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Itself while there is room below for anything it may hold, otherwise balanced. With d inner nodes above and n leaves
-    /// below, a balanced tree needs d + ceil(log2 n); descending keeps that bound as long as it is below the limit.
+    /// Itself while there is room below for anything it may hold, otherwise balanced. With d inner
+    /// nodes above and n leaves below, a balanced tree needs d + ceil(log2 n); descending keeps
+    /// that bound as long as it is below the limit.
     fn limited(self, depth: u32, most: u32, counts: &[u32]) -> Self {
         match &self {
             Source::Tree { tree, node } if depth + counts[*node].next_power_of_two().ilog2() >= most => {
@@ -351,7 +371,8 @@ mod tests {
         }
     }
 
-    /// Triangles of many kinds: small ones, long slivers across everything, flat ones, one of no extent.
+    /// Triangles of many kinds: small ones, long slivers across everything, flat ones, one of no
+    /// extent.
     fn triangles(n: usize, scale: f32, offset: f32) -> Vec<[Vec3; 3]> {
         let mut next = numbers();
         let mut point = move || Vec3::new(next(), next(), next());
@@ -423,7 +444,7 @@ mod tests {
         assert!(cost(&with) < 0.9 * cost(&without), "{} {}", cost(&with), cost(&without));
     }
 
-    /// What reinsertion is for: it finds where a few large boxes among small ones cost least.
+    /// Reinsertion finds where a few large boxes among small ones cost least.
     #[test]
     fn reinsertion_lowers_the_cost() {
         let boxes: Vec<Aabb> = triangles(5000, 1.0, 0.0).iter().map(|t| Aabb::of_points(t)).collect();
@@ -479,7 +500,8 @@ mod tests {
         }
     }
 
-    /// Boxes whose sizes grow geometrically, in a chain: it must be cut at the limit, and hold the same leaves.
+    /// Boxes whose sizes grow geometrically, in a chain: it must be cut at the limit, and hold the
+    /// same leaves.
     #[test]
     fn a_chain_is_cut_at_the_limit() {
         let n = 240usize;

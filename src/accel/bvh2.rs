@@ -1,10 +1,13 @@
 //! The binary hierarchy that `shaders/trace/reference.glsl` traverses.
 //!
-//! A node stores the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded that is not tested. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
-//! entries, and the shader's stack size is specialized to the depth of the tree.
+//! A node stores the boxes of both its children: a visit is one load of 64 bytes, and no box is
+//! loaded that is not tested. The traversal's stack cannot overflow: every inner node pushes at
+//! most one child, so a tree of depth d needs d entries, and the shader's stack size is specialized
+//! to the depth of the tree.
 //!
-//! A reference to an inner node also says along which axis that node's children lie apart, the lower one first. A traversal that
-//! orders children by the sign of the ray's direction thus knows the order without loading anything more, and nodes do not grow.
+//! A reference to an inner node also says along which axis that node's children lie apart, the
+//! lower one first. A traversal that orders children by the sign of the ray's direction thus knows
+//! the order without loading anything more, and nodes do not grow.
 
 use glam::Vec3;
 
@@ -43,12 +46,14 @@ pub fn leaf_range(reference: u32) -> Option<(u32, u32)> {
     (reference & LEAF != 0).then_some((reference & NODE_NUMBER, (reference >> 27 & 0xf) + 1))
 }
 
-/// Splits a reference to an inner node into its number and the axis (0, 1, 2) along which its children lie apart.
+/// Splits a reference to an inner node into its number and the axis (0, 1, 2) along which its
+/// children lie apart.
 pub fn inner_node(reference: u32) -> Option<(u32, usize)> {
     (reference & LEAF == 0 && reference != EMPTY).then_some((reference & NODE_NUMBER, (reference >> AXIS_SHIFT) as usize))
 }
 
-/// The axis along which the centres of two boxes lie farthest apart, and whether the first box is the upper one there.
+/// The axis along which the centres of two boxes lie farthest apart, and whether the first box is
+/// the upper one there.
 fn split_axis(a: &Aabb, b: &Aabb) -> (u32, bool) {
     // twice the centres; halves first, so that huge boxes do not overflow
     let apart = (b.min * 0.5 + b.max * 0.5) - (a.min * 0.5 + a.max * 0.5);
@@ -56,7 +61,8 @@ fn split_axis(a: &Aabb, b: &Aabb) -> (u32, bool) {
     (axis as u32, apart[axis] < 0.0)
 }
 
-/// A reference as seen from a buffer in which this tree's nodes begin at `first_node` and its primitives at `first_primitive`.
+/// A reference as seen from a buffer in which this tree's nodes begin at `first_node` and its
+/// primitives at `first_primitive`.
 pub fn rebase(reference: u32, first_node: u32, first_primitive: u32) -> u32 {
     if reference & LEAF != 0 {
         reference + first_primitive
@@ -68,8 +74,8 @@ pub fn rebase(reference: u32, first_node: u32, first_primitive: u32) -> u32 {
 }
 
 impl Bvh2 {
-    /// Builds the tree of `boxes`; none may be empty or NaN, and there are at most [`MAX_PRIMITIVES`]. `max_leaf` (1 to
-    /// [`MAX_LEAF`]) bounds the primitives of a leaf.
+    /// Builds the tree of `boxes`; none may be empty or NaN, and there are at most
+    /// [`MAX_PRIMITIVES`]. `max_leaf` (1 to [`MAX_LEAF`]) bounds the primitives of a leaf.
     pub fn build(boxes: &[Aabb], preset: BuildPreset, max_leaf: u32) -> Self {
         assert!(boxes.len() <= MAX_PRIMITIVES);
         if boxes.is_empty() {
@@ -108,12 +114,14 @@ impl Bvh2 {
         out
     }
 
-    /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box contains
-    /// its children's, children in order along the stated axis, the depth as stated.
+    /// Checks the whole structure against the boxes it was built from: every primitive in exactly
+    /// one leaf, every box contains its children's, children in order along the stated axis, the
+    /// depth as stated.
     ///
     /// # Errors
     /// A description of the first defect.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
+        // from the root down: each primitive in one leaf, each box within its parent's
         let mut seen = vec![false; boxes.len()];
         let mut depth = 0;
         let all = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
@@ -152,6 +160,8 @@ impl Bvh2 {
                 work.push((node.children[side], child, level + 1));
             }
         }
+
+        // nothing may be missing, and traversal's stack relies on the depth
         if let Some(p) = seen.iter().position(|s| !s) {
             return Err(format!("primitive {p} is in no leaf"));
         }
@@ -189,7 +199,8 @@ mod tests {
         }
     }
 
-    /// Two clusters apart along one axis only: the root must say so, whichever of them the builder put first.
+    /// Two clusters apart along one axis only: the root must say so, whichever of them the builder
+    /// put first.
     #[test]
     fn a_reference_names_the_axis_that_separates() {
         for axis in 0..3 {

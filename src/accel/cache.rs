@@ -1,12 +1,15 @@
-//! On-disk cache of built hierarchies: named byte arrays under a 128-bit hash of everything they were built from.
+//! On-disk cache of built hierarchies: named byte arrays under a 128-bit hash of everything they
+//! were built from.
 //!
-//! The cache never fails a command. A damaged file (its header has its length and a checksum) is ignored with a warning and
-//! rewritten; a file that cannot be written (a full disk, a folder that may not be written) is a warning. Files are
-//! written beside and renamed, so several writers may race: each file is complete, and all files of one key are identical.
+//! The cache never fails a command. A damaged file (its header has its length and a checksum) is
+//! ignored with a warning and rewritten; a file that cannot be written (a full disk, a folder that
+//! may not be written) is a warning. Files are written beside and renamed, so several writers may
+//! race: each file is complete, and all files of one key are identical.
 //!
-//! XXH3 (`xxhash-rust`) makes keys and checksums: some ten GB a second, where a cryptographic hash would take as long as the
-//! build that it saves. A checksum tells damage, not malice: files of other users are not read, and whoever loads a hierarchy checks it against the geometry
-//! that it is for (`tracer::wide`).
+//! XXH3 (`xxhash-rust`) makes keys and checksums: some ten GB a second, where a cryptographic hash
+//! would take as long as the build that it saves. A checksum tells damage, not malice: files of
+//! other users are not read, and whoever loads a hierarchy checks it against the geometry that it
+//! is for (`tracer::wide`).
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -24,7 +27,8 @@ const HEAD: usize = 8 + 8 + 16;
 /// Maximum length of an array's name, bytes.
 const MAX_NAME: usize = 255;
 
-/// Builds the key of a hierarchy. Add everything that the result depends on, the version of the layout included.
+/// Builds the key of a hierarchy. Add everything that the result depends on, the version of the
+/// layout included.
 #[derive(Clone, Default)]
 pub struct KeyBuilder(Xxh3);
 
@@ -55,7 +59,8 @@ pub struct Entries {
 }
 
 impl Entries {
-    /// The array of a name as values of type `T`. `None` if it does not exist, or if its length is not a multiple of the size of `T`.
+    /// The array of a name as values of type `T`. `None` if it does not exist, or if its length is
+    /// not a multiple of the size of `T`.
     pub fn get<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, name: &str) -> Option<Vec<T>> {
         let (_, range) = self.ranges.iter().find(|(n, _)| n == name)?;
         let bytes = &self.bytes[range.clone()];
@@ -231,13 +236,14 @@ mod tests {
 
     #[test]
     fn parts_of_a_key_do_not_run_together() {
-        let of = |parts: &[&str]| parts.iter().fold(KeyBuilder::default(), |k, p| k.with(p.as_bytes())).finish();
-        assert_ne!(of(&["ab", "c"]), of(&["a", "bc"]));
-        assert_ne!(of(&["ab"]), of(&["ab", ""]));
-        assert_eq!(of(&["ab", "c"]), of(&["ab", "c"]));
+        let key = |parts: &[&str]| parts.iter().fold(KeyBuilder::default(), |k, p| k.with(p.as_bytes())).finish();
+        assert_ne!(key(&["ab", "c"]), key(&["a", "bc"]));
+        assert_ne!(key(&["ab"]), key(&["ab", ""]));
+        assert_eq!(key(&["ab", "c"]), key(&["ab", "c"]));
     }
 
-    /// Cut short at any length, or with any one bit turned, a file is not read; and it is replaced by the next to store.
+    /// Cut short at any length, or with any one bit turned, a file is not read; and it is replaced
+    /// by the next to store.
     #[test]
     fn damage_is_seen_and_mended() {
         let folder = tempfile::tempdir().unwrap();
@@ -288,7 +294,8 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside");
     }
 
-    /// Where no file can be written (here the folder is a file) there is a warning, and nothing else.
+    /// Where no file can be written (here the folder is a file) there is a warning, and nothing
+    /// else.
     #[test]
     fn a_folder_that_cannot_be_is_no_error() {
         let folder = tempfile::tempdir().unwrap();

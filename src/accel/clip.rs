@@ -1,6 +1,8 @@
-//! The part of a primitive that lies in a cell, as a box: what a spatial split leaves of it on either side.
+//! The part of a primitive that lies in a cell, as a box: what a spatial split leaves of it on
+//! either side.
 //!
-//! Conservative: rounding only ever makes the box larger, so the boxes of all parts together hold the primitive.
+//! Conservative: rounding only ever makes the box larger, so the boxes of all parts together hold
+//! the primitive.
 
 use glam::{DVec3, Vec3};
 
@@ -8,7 +10,8 @@ use super::Aabb;
 
 /// The triangles that a primitive consists of.
 pub trait Triangles: Sync {
-    /// Calls `see` with each triangle of a primitive; with none for a primitive that must not be split.
+    /// Calls `see` with each triangle of a primitive; with none for a primitive that must not be
+    /// split.
     fn each(&self, primitive: u32, see: &mut dyn FnMut([Vec3; 3]));
 }
 
@@ -18,13 +21,14 @@ impl<F: Fn(u32, &mut dyn FnMut([Vec3; 3])) + Sync> Triangles for F {
     }
 }
 
-/// A box around the part of a primitive that lies in a cell, itself in the cell. None if there is no such part.
+/// A box around the part of a primitive that lies in a cell, itself in the cell. None if there is
+/// no such part.
 pub fn clip(primitive: u32, cell: Aabb, triangles: &impl Triangles) -> Option<Aabb> {
     let (mut min, mut max, mut reach) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
     triangles.each(primitive, &mut |t| {
         let t = t.map(Vec3::as_dvec3);
         reach = t.iter().fold(reach, |r, p| r.max(p.abs().max_element()));
-        let mut polygon = Polygon::of(t);
+        let mut polygon = Polygon::from_corners(t);
         for axis in 0..3 {
             polygon.keep(axis, cell.min[axis] as f64, 1.0);
             polygon.keep(axis, cell.max[axis] as f64, -1.0);
@@ -47,7 +51,8 @@ pub fn clip(primitive: u32, cell: Aabb, triangles: &impl Triangles) -> Option<Aa
     out.min.cmple(out.max).all().then_some(out)
 }
 
-/// A convex polygon: a triangle clipped by six planes, which is nine corners, or a few more where rounding bends a sliver.
+/// A convex polygon: a triangle clipped by six planes, which is nine corners, or a few more where
+/// rounding bends a sliver.
 struct Polygon {
     points: [DVec3; 12],
     count: usize,
@@ -56,7 +61,7 @@ struct Polygon {
 }
 
 impl Polygon {
-    fn of([a, b, c]: [DVec3; 3]) -> Self {
+    fn from_corners([a, b, c]: [DVec3; 3]) -> Self {
         let mut points = [DVec3::ZERO; 12];
         points[..3].copy_from_slice(&[a, b, c]);
         Self { points, count: 3, overflowed: false }
@@ -108,7 +113,8 @@ mod tests {
         }
     }
 
-    /// Whatever plane a triangle is cut by, at any scale and far from the origin, every point of it is in one of both boxes.
+    /// Whatever plane a triangle is cut by, at any scale and far from the origin, every point of it
+    /// is in one of both boxes.
     #[test]
     fn parts_hold_the_whole() {
         let mut next = numbers();

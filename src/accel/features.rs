@@ -1,4 +1,5 @@
-//! Features that a scene uses, found once at load. Unused features are specialized out of the shaders, not recorded and not traced.
+//! Features that a scene uses, found once at load. Unused features are specialized out of the
+//! shaders, not recorded and not traced.
 
 use super::flatten::FlatScene;
 use crate::interface::ShadingFeatures;
@@ -15,7 +16,8 @@ pub enum AlphaClass {
     Absent,
 }
 
-/// Alpha below this counts as transparent; `None` for opaque materials. Streams with binary visibility treat BLEND as MASK with a cutoff of 0.5.
+/// Alpha below this counts as transparent; `None` for opaque materials. Streams with binary
+/// visibility treat BLEND as MASK with a cutoff of 0.5.
 pub fn alpha_cutoff(material: &Material) -> Option<f32> {
     match material.alpha_mode {
         AlphaMode::Opaque => None,
@@ -30,12 +32,14 @@ pub enum Blend {
     /// As a mask with a cutoff of 0.5, for streams with binary visibility.
     #[default]
     Masked,
-    /// Stochastic alpha, for path tracing: a hit is accepted with a probability of alpha, sampled anew for each ray. Spheres, which have no
-    /// texture coordinates to seed the sample with, are masked.
+    /// Stochastic alpha, for path tracing: a hit is accepted with a probability of alpha, sampled
+    /// anew for each ray. Spheres, which have no texture coordinates to seed the sample with, are
+    /// masked.
     Stochastic,
 }
 
-/// Class of each mesh of the scene, from the range of alpha that its material and vertices can reach.
+/// Class of each mesh of the scene, from the range of alpha that its material and vertices can
+/// reach.
 pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
     // range of alpha of each texture, computed once and only where an alpha mode needs it
     let mut ranges: Vec<Option<(f32, f32)>> = vec![None; scene.textures.len()];
@@ -45,6 +49,8 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
         .map(|mesh| {
             let material = &scene.materials[mesh.material];
             let Some(cutoff) = alpha_cutoff(material) else { return AlphaClass::Opaque };
+
+            // the range that alpha has on the mesh: the factor by texture and vertex colours
             let (mut lo, mut hi) = (material.base_color.w, material.base_color.w);
             if let Geometry::Triangles(t) = &mesh.geometry {
                 if let Some(slot) = &material.base_color_texture {
@@ -56,8 +62,11 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
                     (lo, hi) = (lo * a, hi * b);
                 }
             }
+
             // interpolation rounds: a range that just reaches the cutoff is tested
             let margin = 1e-5;
+
+            // stochastic alpha is opaque from 1 on, and absent at 0
             let covered = blend == Blend::Stochastic && material.alpha_mode == AlphaMode::Blend;
             if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
                 return match (lo >= 1.0 - margin, hi <= 0.0) {
@@ -66,6 +75,8 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
                     _ => AlphaClass::Tested,
                 };
             }
+
+            // a mask compares with the cutoff
             if lo >= cutoff + margin || cutoff <= 0.0 {
                 AlphaClass::Opaque
             } else if hi < cutoff - margin {
@@ -105,7 +116,7 @@ pub struct SceneFeatures {
 
 impl SceneFeatures {
     /// Finds the features of a flattened scene.
-    pub fn of(flat: &FlatScene) -> Self {
+    pub fn from_flat(flat: &FlatScene) -> Self {
         Self {
             alpha: flat.has_alpha(),
             stochastic_alpha: flat.has_stochastic_alpha(),

@@ -1,9 +1,10 @@
-//! Arranges a scene's instances into the bottom-level (BLAS) and top-level (TLAS) geometry that tracers build over.
+//! Arranges a scene's instances into the bottom-level (BLAS) and top-level (TLAS) geometry that
+//! tracers build over.
 //!
-//! A mesh with a single instance gains nothing from a BLAS of its own: all such meshes are baked into one *group* of
-//! triangles (and one of spheres) in world space. A mesh with several instances is a group of its own with several TLAS
-//! instances. A group is the geometry of one BLAS. Most files end up as one group with one TLAS instance, and the top level is
-//! skipped altogether.
+//! A mesh with a single instance gains nothing from a BLAS of its own: all such meshes are baked
+//! into one *group* of triangles (and one of spheres) in world space. A mesh with several instances
+//! is a group of its own with several TLAS instances. A group is the geometry of one BLAS. Most
+//! files end up as one group with one TLAS instance, and the top level is skipped altogether.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -17,7 +18,8 @@ use crate::scene::{AlphaMode, Geometry, Motion, Scene, Sphere};
 pub struct Submesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Index into [`Scene::instances`] of the baked instance; `None` where the group has several TLAS instances, which then name it.
+    /// Index into [`Scene::instances`] of the baked instance; `None` where the group has several
+    /// TLAS instances, which then name it.
     pub scene_instance: Option<usize>,
     /// Transform from mesh space to group space; identity unless baked.
     pub to_group: DAffine3,
@@ -38,12 +40,13 @@ impl Submesh {
     }
 }
 
-/// The geometry of one bottom-level acceleration structure (a group): triangles or spheres, never both.
+/// The geometry of one bottom-level acceleration structure (a group): triangles or spheres, never
+/// both.
 #[derive(Clone, Debug)]
 pub struct BlasGroup {
     /// True for spheres, false for triangles.
     pub spheres: bool,
-    /// Its submeshes; alpha-tested ones last.
+    /// Submeshes of the group; alpha-tested ones last.
     pub submeshes: Vec<Submesh>,
     /// Number of triangles or spheres.
     pub primitive_count: usize,
@@ -89,15 +92,18 @@ impl<'a> FlatScene<'a> {
         Self::group(scene, Motion::default(), Blend::Masked)
     }
 
-    /// As [`FlatScene::new`], for path tracing: blended surfaces are intersected with a probability of their alpha ([`Blend::Stochastic`]).
+    /// As [`FlatScene::new`], for path tracing: blended surfaces are intersected with a probability
+    /// of their alpha ([`Blend::Stochastic`]).
     pub fn for_paths(scene: &'a Scene) -> Self {
         Self::group(scene, Motion::default(), Blend::Stochastic)
     }
 
-    /// Arranges a dynamic scene. A mesh that may move or deform is not baked: it is a group of its own, in object space.
+    /// Arranges a dynamic scene. A mesh that may move or deform is not baked: it is a group of its
+    /// own, in object space.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] when `motion` names an instance or mesh that does not exist, or asks spheres to deform.
+    /// [`crate::Error::Usage`] when `motion` names an instance or mesh that does not exist, or asks
+    /// spheres to deform.
     pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
         Self::with_motion_and_blend(scene, motion, Blend::Masked)
     }
@@ -114,6 +120,8 @@ impl<'a> FlatScene<'a> {
     fn group(scene: &'a Scene, motion: Motion, blend: Blend) -> Self {
         let origin = scene.origin();
         let alpha = alpha_classes(scene, blend);
+
+        // a mesh that is used once and never changes can be baked into world space
         let mut uses = vec![0usize; scene.meshes.len()];
         for i in &scene.instances {
             uses[i.mesh] += 1;
@@ -122,10 +130,13 @@ impl<'a> FlatScene<'a> {
         for mesh in motion.meshes.iter().copied().chain(motion.instances.iter().map(|&i| scene.instances[i].mesh)) {
             changes[mesh] = true;
         }
+
+        // in world space: a group of triangles and one of spheres; other meshes have their own
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
         let mut flat = Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
         let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
+
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
         for tested in [false, true] {
             for (k, instance) in scene.instances.iter().enumerate() {
@@ -153,6 +164,8 @@ impl<'a> FlatScene<'a> {
                 }
             }
         }
+
+        // the groups in world space are instances, too
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
             flat.instances.push(TlasInstance { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
             flat.groups.push(group);
@@ -219,7 +232,8 @@ impl<'a> FlatScene<'a> {
         }
     }
 
-    /// The index of the group that consists of this mesh alone, if it was not baked into a larger one.
+    /// The index of the group that consists of this mesh alone, if it was not baked into a larger
+    /// one.
     pub fn group_of_mesh(&self, mesh: usize) -> Option<usize> {
         self.groups.iter().position(|g| matches!(g.submeshes.as_slice(), [p] if p.mesh == mesh))
     }
@@ -247,7 +261,8 @@ fn place(part: &Submesh, p: Vec3) -> Vec3 {
     if part.to_group == DAffine3::IDENTITY { p } else { part.to_group.transform_point3(p.as_dvec3()).as_vec3() }
 }
 
-/// Is the transform a similarity (rotation, uniform scale, mirroring, translation), which maps spheres to spheres?
+/// Is the transform a similarity (rotation, uniform scale, mirroring, translation), which maps
+/// spheres to spheres?
 fn is_similarity(t: &DAffine3) -> bool {
     let m = t.matrix3;
     let (a, b, c) = (m.x_axis.length_squared(), m.y_axis.length_squared(), m.z_axis.length_squared());

@@ -1,5 +1,6 @@
-//! Pairs of triangles that share an edge: what a leaf of the wide hierarchy holds. Two triangles take four corners instead of
-//! six, the shared edge is tested once, and the hierarchy is built over half as many boxes.
+//! Pairs of triangles that share an edge: what a leaf of the wide hierarchy holds. Two triangles
+//! take four corners instead of six, the shared edge is tested once, and the hierarchy is built
+//! over half as many boxes.
 
 use rayon::prelude::*;
 
@@ -20,7 +21,8 @@ pub struct Pair {
 pub struct Fan {
     /// Vertices; the last repeats the third where there is one triangle only.
     pub corners: [u32; 4],
-    /// For each triangle, the positions within (0, 1, 2) and (0, 2, 3) of its second and third corner.
+    /// For each triangle, the positions within (0, 1, 2) and (0, 2, 3) of its second and third
+    /// corner.
     pub second_third: [[u8; 2]; 2],
 }
 
@@ -31,7 +33,7 @@ impl Fan {
     }
 
     /// Two triangles, if they share two vertices.
-    pub fn of(a: [u32; 3], b: [u32; 3]) -> Option<Self> {
+    pub fn from_triangles(a: [u32; 3], b: [u32; 3]) -> Option<Self> {
         // the corner of each that the other lacks
         let apex = (0..3).find(|&k| !b.contains(&a[k]))?;
         let other = (0..3).find(|&k| !a.contains(&b[k]))?;
@@ -76,6 +78,8 @@ fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
             *at += 1;
         }
     }
+
+    // edges of a bucket with the same upper vertex are joined, two at a time
     let mut out = vec![[NONE; 3]; triangles.len()];
     let mut join = |a: u32, b: u32| {
         out[a as usize / 3][a as usize % 3] = b / 3;
@@ -106,14 +110,17 @@ fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
 /// Number of edges at a vertex above which not all pairs are compared.
 const CROWDED: usize = 32;
 
-/// Matches triangles with neighbours so that the boxes of the pairs are small: in each round, triangles that are each
-/// other's best choice are paired. A box of a pair is never larger than `GROWTH` times the two boxes of its triangles.
+/// Matches triangles with neighbours so that the boxes of the pairs are small: in each round,
+/// triangles that are each other's best choice are paired. A box of a pair is never larger than
+/// `GROWTH` times the two boxes of its triangles.
 pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> Vec<Pair> {
     const ROUNDS: usize = 4;
     const GROWTH: f32 = 1.2;
     let neighbours = neighbours(triangles, vertex_count);
     let mut partner = vec![NONE; triangles.len()];
     let mut wish = vec![NONE; triangles.len()];
+
+    // in each round every triangle wishes for its best neighbour, and mutual wishes become pairs
     for _ in 0..ROUNDS {
         wish.par_iter_mut().with_min_len(4096).enumerate().for_each(|(t, wish)| {
             *wish = NONE;
@@ -122,7 +129,10 @@ pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> V
             }
             let mut best = (f32::INFINITY, NONE, NONE);
             for &n in &neighbours[t] {
-                if n == NONE || partner[n as usize] != NONE || Fan::of(triangles[t], triangles[n as usize]).is_none() {
+                if n == NONE
+                    || partner[n as usize] != NONE
+                    || Fan::from_triangles(triangles[t], triangles[n as usize]).is_none()
+                {
                     continue;
                 }
                 let (a, b) = (boxes[t], boxes[n as usize]);
@@ -137,6 +147,8 @@ pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> V
                 }
             }
         });
+
+        // both sides see the same wishes, so that this needs no lock
         partner.par_iter_mut().with_min_len(4096).enumerate().for_each(|(t, partner)| {
             let w = wish[t];
             if *partner == NONE && w != NONE && wish[w as usize] == t as u32 {
@@ -144,6 +156,8 @@ pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> V
             }
         });
     }
+
+    // the lower triangle of a pair lists it
     let mut pairs = Vec::with_capacity(triangles.len() / 2 + 1);
     for (t, &p) in partner.iter().enumerate() {
         if p == NONE || p > t as u32 {
@@ -163,7 +177,8 @@ mod tests {
         triangles.iter().map(|t| Aabb::of_points(&t.map(|v| positions[v as usize]))).collect()
     }
 
-    /// The corners of both triangles by a fan, as each triangle has them: its first is what the other two leave.
+    /// The corners of both triangles by a fan, as each triangle has them: its first is what the
+    /// other two leave.
     fn unfolded(fan: &Fan) -> [[u32; 3]; 2] {
         let [a, b, c, d] = fan.corners;
         let own = |corners: [u32; 3], [second, third]: [u8; 2]| {
@@ -183,7 +198,7 @@ mod tests {
             // two vertices in common, every rotation and winding
             let a = turned(if k / 9 % 2 == 0 { [10, 20, 30] } else { [20, 10, 30] }, k % 3);
             let b = turned(if k / 18 == 0 { [20, 10, 40] } else { [10, 20, 40] }, k / 3 % 3);
-            let fan = Fan::of(a, b).unwrap_or_else(|| panic!("{a:?} and {b:?} share an edge"));
+            let fan = Fan::from_triangles(a, b).unwrap_or_else(|| panic!("{a:?} and {b:?} share an edge"));
             assert_eq!(unfolded(&fan), [a, b], "{fan:?}");
             let mut ends = [fan.corners[0], fan.corners[2]];
             ends.sort_unstable();
@@ -193,7 +208,8 @@ mod tests {
         assert_eq!(unfolded(&one)[0], [7, 8, 9]);
     }
 
-    /// Very many triangles around one vertex: those with a common edge find each other, and in time.
+    /// Very many triangles around one vertex: those with a common edge find each other, and in
+    /// time.
     #[test]
     fn a_crowded_vertex() {
         const PAIRS: u32 = 100_000;
@@ -226,11 +242,12 @@ mod tests {
             ([1, 0, 1], [1, 0, 2]),
             ([0, 0, 0], [0, 0, 0]),
         ] {
-            assert_eq!(Fan::of(a, b), None, "{a:?} {b:?}");
+            assert_eq!(Fan::from_triangles(a, b), None, "{a:?} {b:?}");
         }
     }
 
-    /// Every triangle is in one pair, once; partners share an edge and do not grow their boxes beyond what is allowed.
+    /// Every triangle is in one pair, once; partners share an edge and do not grow their boxes
+    /// beyond what is allowed.
     fn check(triangles: &[[u32; 3]], positions: &[Vec3]) -> usize {
         let boxes = boxes(triangles, positions);
         let pairs = pair_up(triangles, &boxes, positions.len());
@@ -239,7 +256,8 @@ mod tests {
             seen[*a as usize] += 1;
             if *b != NONE {
                 seen[*b as usize] += 1;
-                let fan = Fan::of(triangles[*a as usize], triangles[*b as usize]).expect("a pair without a common edge");
+                let fan =
+                    Fan::from_triangles(triangles[*a as usize], triangles[*b as usize]).expect("a pair without a common edge");
                 assert_eq!(unfolded(&fan), [triangles[*a as usize], triangles[*b as usize]]);
                 let (a, b) = (boxes[*a as usize], boxes[*b as usize]);
                 assert!(a.union(b).half_area() <= 1.21 * (a.half_area() + b.half_area()));

@@ -1,6 +1,7 @@
-//! Refitting: the boxes of a wide hierarchy are recomputed bottom-up for leaves that have moved, while its topology
-//! stays (Wald, Boulos, Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007). Boxes are
-//! quantised by the same code as at the build, so a refit to unchanged leaves changes no bit.
+//! Refitting: the boxes of a wide hierarchy are recomputed bottom-up for leaves that have moved,
+//! while its topology stays (Wald, Boulos, Shirley, "Ray Tracing Deformable Scenes Using Dynamic
+//! Bounding Volume Hierarchies", TOG 2007). Boxes are quantised by the same code as at the build,
+//! so a refit to unchanged leaves changes no bit.
 //!
 //! [`RefitPolicy`] decides when a tree that was refitted repeatedly should be rebuilt.
 
@@ -11,13 +12,14 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::wide::{self, Block, WIDTH, WideBvh};
 
-/// Minimum number of blocks refitted by one thread: below that, scheduling costs more than the work.
+/// Minimum number of blocks refitted by one thread: below that, scheduling costs more than the
+/// work.
 const TASK_BLOCKS: usize = 2048;
 /// Approximate maximum number of parallel tasks: a few per thread of any machine.
 const TASKS: usize = 128;
 
-/// How a tree is refitted in parallel: its subtrees whose blocks below the root lie side by side, and what is above them. It stays
-/// valid until the tree is rebuilt.
+/// How a tree is refitted in parallel: its subtrees whose blocks below the root lie side by side,
+/// and what is above them. It stays valid until the tree is rebuilt.
 #[derive(Clone, Debug)]
 pub struct RefitPlan {
     /// Roots of subtrees, and the blocks below each; in the order of the blocks.
@@ -61,7 +63,8 @@ impl RefitPlan {
     }
 }
 
-/// Of every block: how many are below it, and the last of them (itself where there is none). Children have larger numbers.
+/// Returns for every block how many are below it, and the last of them (itself where there is
+/// none). Children have larger numbers.
 fn descendants(blocks: &[Block], base: u32) -> Vec<[u32; 2]> {
     let mut out: Vec<[u32; 2]> = (0..blocks.len() as u32).map(|n| [0, n]).collect();
     for n in (0..blocks.len()).rev().filter(|&n| !wide::is_leaf(&blocks[n])) {
@@ -75,8 +78,8 @@ fn descendants(blocks: &[Block], base: u32) -> Vec<[u32; 2]> {
     out
 }
 
-/// Refits a tree in place. Its node references count its first block as `base`. `leaf` rewrites a leaf and returns its box; boxes are
-/// widened by `pad`. The plan must be that of this tree.
+/// Refits a tree in place. Its node references count its first block as `base`. `leaf` rewrites a
+/// leaf and returns its box; boxes are widened by `pad`. The plan must be that of this tree.
 pub fn refit(
     blocks: &mut [Block],
     base: u32,
@@ -88,6 +91,8 @@ pub fn refit(
         let b = leaf(block);
         Aabb { min: b.min - pad, max: b.max + pad }
     };
+
+    // each task gets its own slice of the blocks
     let mut roots: Vec<Block> = plan.tasks.iter().map(|t| blocks[t.0 as usize]).collect();
     let mut parts = Vec::with_capacity(plan.tasks.len());
     let (mut left, mut at) = (&mut *blocks, 0);
@@ -96,6 +101,8 @@ pub fn refit(
         (left, at) = (others, task.1.end);
         parts.push((root, base + task.1.start as u32, part));
     }
+
+    // subtrees in parallel, children before parents
     let done: Vec<(Aabb, f64)> = parts
         .into_par_iter()
         .map_init(Vec::new, |boxes, (root, first, part)| {
@@ -110,6 +117,7 @@ pub fn refit(
             (bounds, area + bounds.half_area() as f64)
         })
         .collect();
+
     // what is above, with the subtrees' roots in their places
     let mut boxes = vec![Aabb::EMPTY; plan.rest.len()];
     let mut area = done.iter().map(|d| d.1).sum::<f64>();
@@ -124,6 +132,8 @@ pub fn refit(
         boxes[k] = fit(&mut blocks[plan.rest[k] as usize], &padded, |child| boxes[place(child - base)]);
         area += boxes[k].half_area() as f64;
     }
+
+    // the cost is relative to the area of the whole
     match boxes.first() {
         Some(b) if b.min.cmple(b.max).all() => {
             // a point or a line has no area, and every box is visited
@@ -162,11 +172,13 @@ impl WideBvh {
 
 /// Decides when to rebuild a tree instead of refitting it once more.
 ///
-/// The expected cost of a ray grows with the surface areas of the boxes, so a tree whose SAH cost is `g` times that at its build makes
-/// a trace of `T` seconds take `T (1 - 1/g)` longer than it had to. These losses are added up; once they exceed what a build takes beyond a
-/// refit, the tree is rebuilt. That is the ski-rental rule (buy when the rent paid equals the price), which costs at most twice the optimal
-/// schedule. Lauterbach, Yoon, Tuft, Manocha, "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes Using
-/// BVHs", RT 2006, watch areas in the same way and rebuild at a fixed growth; so does this policy while trace times are unknown.
+/// The expected cost of a ray grows with the surface areas of the boxes, so a tree whose SAH cost
+/// is `g` times that at its build makes a trace of `T` seconds take `T (1 - 1/g)` longer than it
+/// had to. These losses are added up; once they exceed what a build takes beyond a refit, the tree
+/// is rebuilt. That is the ski-rental rule (buy when the rent paid equals the price), which costs
+/// at most twice the optimal schedule. Lauterbach, Yoon, Tuft, Manocha, "RT-DEFORM: Interactive Ray
+/// Tracing of Dynamic Scenes Using BVHs", RT 2006, watch areas in the same way and rebuild at a
+/// fixed growth; so does this policy while trace times are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefitPolicy {
     built_cost: f64,
@@ -320,7 +332,8 @@ mod tests {
     fn the_policy_rebuilds_when_the_loss_exceeds_the_price() {
         let mut p = RefitPolicy::new(50.0, 0.5);
         p.refitted(100.0, 0.1);
-        // half of each trace is lost: after eight it is the 0.4 seconds that a rebuild takes beyond a refit
+        // half of each trace is lost: after eight it is the 0.4 seconds that a rebuild takes beyond
+        // a refit
         for k in 1..=7 {
             p.traced(0.1);
             assert!((p.lost_seconds - 0.05 * k as f64).abs() < 1e-12);

@@ -1,5 +1,6 @@
-//! Makes a binary tree cheaper by moving subtrees to where they cost less: Meister and Bittner, "Parallel Reinsertion for
-//! Bounding Volume Hierarchy Optimization" (EG 2018). The search is parallel, the moves are not.
+//! Makes a binary tree cheaper by moving subtrees to where they cost less: Meister and Bittner,
+//! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization" (EG 2018). The search is
+//! parallel, the moves are not.
 //!
 //! It corrects a weakness of top-down builders: a large box has to stay in one of two halves.
 
@@ -40,10 +41,12 @@ struct Move {
     gain: f32,
 }
 
-/// Maximum number of nodes that one search visits. Where thousands of boxes overlap, pruning fails and it would visit all of them.
+/// Maximum number of nodes that one search visits. Where thousands of boxes overlap, pruning fails
+/// and it would visit all of them.
 const MAX_VISITS: u32 = 1 << 12;
 
-/// Minimum number of nodes that a round considers: a share of a small tree would be too few to find anything.
+/// Minimum number of nodes that a round considers: a share of a small tree would be too few to find
+/// anything.
 const MIN_BATCH: usize = 512;
 
 /// When reinsertion stops.
@@ -63,6 +66,8 @@ pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
         return;
     }
     let total: f64 = nodes.par_iter().with_min_len(1 << 14).map(|n| area(corners(n)) as f64).sum();
+
+    // the search climbs, so that it needs the parents
     let mut parents = vec![0u32; nodes.len()];
     for (k, n) in nodes.iter().enumerate() {
         if !n.is_leaf() {
@@ -72,6 +77,8 @@ pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
     }
     let mut touched = vec![0u32; nodes.len()];
     let batch = ((nodes.len() as f64 * options.share as f64) as usize).max(MIN_BATCH).min(nodes.len() - 1);
+
+    // in each round the largest nodes look for better places, and the best moves are made first
     for round in 0..options.rounds {
         let mut saved = 0.0;
         let candidates = largest(nodes, batch);
@@ -83,8 +90,11 @@ pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
             .flatten_iter()
             .collect();
         moves.par_sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
+
+        // moves of one round may not touch one another's nodes
         for m in moves {
-            // a node that an earlier move of this round has changed is no longer what the search saw
+            // a node that an earlier move of this round has changed is no longer what the search
+            // saw
             let involved = [m.from, m.to, sibling(m.from), parents[m.from as usize], parents[m.to as usize]];
             if involved.iter().any(|&i| touched[i as usize] == round + 1) {
                 continue;
@@ -102,7 +112,8 @@ pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
     }
 }
 
-/// The nodes of largest area except the root, found top-down, because no child is larger than its parent.
+/// The nodes of largest area except the root, found top-down, because no child is larger than its
+/// parent.
 fn largest(nodes: &[Bvh2Node], count: usize) -> Vec<u32> {
     // areas are not negative, so their bits are in order
     let key = |k: u32| (area(corners(&nodes[k as usize])).to_bits(), std::cmp::Reverse(k));
@@ -120,8 +131,8 @@ fn largest(nodes: &[Bvh2Node], count: usize) -> Vec<u32> {
     out
 }
 
-/// The best new position for a subtree: from its sibling upwards, everything beside the path is searched, and cut off where even a
-/// box that need not grow would gain too little.
+/// The best new position for a subtree: from its sibling upwards, everything beside the path is
+/// searched, and cut off where even a box that need not grow would gain too little.
 fn find(nodes: &[Bvh2Node], parents: &[u32], from: u32, stack: &mut Vec<(f32, u32)>) -> Option<Move> {
     let own = corners(&nodes[from as usize]);
     let own_area = area(own);
@@ -130,12 +141,16 @@ fn find(nodes: &[Bvh2Node], parents: &[u32], from: u32, stack: &mut Vec<(f32, u3
         // taking it out would remove the root
         return None;
     }
+
+    // the tree without the node: what its ancestors shrink by is won wherever it goes
     let mut best = Move { from, to: 0, gain: 0.0 };
     let mut gain = area(corners(&nodes[parent as usize]));
     let mut beside = sibling(from);
     let mut without = corners(&nodes[beside as usize]);
     let mut pivot = parent;
     let mut visits = 0;
+
+    // from each ancestor down the other side, as long as an insertion there may gain more
     loop {
         stack.push((gain, beside));
         while let Some((gain, to)) = stack.pop() {
@@ -161,6 +176,8 @@ fn find(nodes: &[Bvh2Node], parents: &[u32], from: u32, stack: &mut Vec<(f32, u3
                 }
             }
         }
+
+        // one level up: this ancestor shrinks, too
         if pivot != parent {
             without = union(without, corners(&nodes[beside as usize]));
             gain += area(corners(&nodes[pivot as usize])) - area(without);
@@ -201,7 +218,8 @@ fn refit(nodes: &mut [Bvh2Node], parents: &[u32], from: u32) {
         if !node.is_leaf() {
             let [a, b] = [0, 1].map(|k| &nodes[node.first_index as usize + k]);
             let (min, max) = (a.min.min(b.min), a.max.max(b.max));
-            // the first node has moved: an unchanged box of its own says nothing about its new ancestors
+            // the first node has moved: an unchanged box of its own says nothing about its new
+            // ancestors
             if at != from && (min, max) == (node.min, node.max) {
                 return;
             }

@@ -1,9 +1,11 @@
-//! Binary trees from the top down: at each node the plane of least surface-area cost among equally spaced ones on all three
-//! axes (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), few boxes by exhaustive sweep.
+//! Binary trees from the top down: at each node the plane of least surface-area cost among equally
+//! spaced ones on all three axes (Wald, "On fast Construction of SAH-based Bounding Volume
+//! Hierarchies", RT 2007), few boxes by exhaustive sweep.
 //!
-//! Nodes are stored depth first with both children adjacent, so a subtree is one range: threads build theirs without a lock, and
-//! what walks the tree later walks memory forwards. Leaves hold one box each. No path is longer than [`MAX_DEPTH`]: where
-//! the cost would make one, the boxes are halved instead.
+//! Nodes are stored depth first with both children adjacent, so a subtree is one range: threads
+//! build theirs without a lock, and what walks the tree later walks memory forwards. Leaves hold
+//! one box each. No path is longer than [`MAX_DEPTH`]: where the cost would make one, the boxes are
+//! halved instead.
 
 use glam::{UVec4, Vec4};
 use obvhs::bvh2::node::Bvh2Node;
@@ -12,8 +14,8 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::build::MAX_DEPTH;
 
-/// A primitive's box during the build. The fourth lanes contain the primitive's index as a normal float, so that SIMD arithmetic on
-/// them is fast (no denormals, no NaN).
+/// A primitive's box during the build. The fourth lanes contain the primitive's index as a normal
+/// float, so that SIMD arithmetic on them is fast (no denormals, no NaN).
 #[derive(Clone, Copy)]
 pub struct Item {
     min: Vec4,
@@ -109,7 +111,8 @@ impl Grid {
 
     #[inline(always)]
     fn bin(&self, centre: Vec4) -> UVec4 {
-        // rounds to the nearest: adding 2^23 leaves the integer in the low bits, where a cast would check its range
+        // rounds to the nearest: adding 2^23 leaves the integer in the low bits, where a cast would
+        // check its range
         let x = ((centre - self.low) * self.scale - 0.5).max(Vec4::ZERO).min(self.last);
         UVec4::from_array((x + 8_388_608.0).to_array().map(f32::to_bits)) & (BINS as u32 - 1)
     }
@@ -227,7 +230,8 @@ fn subtree(items: &mut [Item], root: &mut Bvh2Node, below: &mut [Bvh2Node], firs
     }
 }
 
-/// Partitions the boxes at the cheapest plane and returns the number on its left. `None` if no plane separates them.
+/// Partitions the boxes at the cheapest plane and returns the number on its left. `None` if no
+/// plane separates them.
 pub(super) fn binned(items: &mut [Item], centres: Bounds) -> Option<usize> {
     let bins = if items.len() > 64 { BINS } else { BINS / 2 };
     let grid = Grid::new(centres, bins);
@@ -250,8 +254,8 @@ pub(super) fn binned(items: &mut [Item], centres: Bounds) -> Option<usize> {
     Some(middle)
 }
 
-/// Moves the items for which `left` is true to the front and returns their number. Branchless (Lomuto's scheme): the branch would be
-/// unpredictable.
+/// Moves the items for which `left` is true to the front and returns their number. Branchless
+/// (Lomuto's scheme): the branch would be unpredictable.
 #[inline(always)]
 fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
     let mut middle = 0;

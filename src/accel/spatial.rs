@@ -1,8 +1,10 @@
-//! Binary trees with spatial splits: Stich, Friedrich and Dietrich, "Spatial Splits in Bounding Volume Hierarchies" (HPG 2009).
+//! Binary trees with spatial splits: Stich, Friedrich and Dietrich, "Spatial Splits in Bounding
+//! Volume Hierarchies" (HPG 2009).
 //!
-//! Where the halves that the surface-area heuristic would make overlap, a node may be cut by a plane instead, and what
-//! straddles the plane goes to both sides, each with the box of its part. Leaves contain one reference each; a primitive may be in
-//! several leaves, which together cover it.
+//! Where the halves that the surface-area heuristic would make overlap, a node may be cut by a
+//! plane instead, and what straddles the plane goes to both sides, each with the box of its part.
+//! Leaves contain one reference each; a primitive may be in several leaves, which together cover
+//! it.
 
 use glam::Vec3;
 use obvhs::bvh2::node::Bvh2Node;
@@ -14,7 +16,8 @@ use super::clip::{Triangles, clip};
 use super::sah::{self, Bounds, Item};
 
 const BINS: usize = 16;
-/// A spatial split is looked for where the halves overlap in more than this share of the whole tree's area (Stich's alpha).
+/// A spatial split is looked for where the halves overlap in more than this share of the whole
+/// tree's area (Stich's alpha).
 const OVERLAP: f32 = 1e-5;
 /// Boxes of a node below which cutting no longer pays for its time.
 const SMALLEST: usize = 24;
@@ -26,8 +29,9 @@ struct Builder<'a, T> {
     pad: f32,
 }
 
-/// The nodes over primitives with these boxes (at least one), depth first as [`sah::tree`] lays them; leaves name their
-/// primitive. At most `budget` times as many references are added as there are primitives. Every box is widened by `pad`.
+/// The nodes over primitives with these boxes (at least one), depth first as [`sah::tree`] lays
+/// them; leaves name their primitive. At most `budget` times as many references are added as there
+/// are primitives. Every box is widened by `pad`.
 pub fn tree(boxes: &[Aabb], triangles: &impl Triangles, budget: f32, pad: f32) -> Vec<Bvh2Node> {
     let grow = |b: Aabb| Aabb { min: b.min - pad, max: b.max + pad };
     let items: Vec<Item> = boxes.par_iter().enumerate().map(|(i, &b)| Item::new(grow(b), i as u32)).collect();
@@ -40,7 +44,7 @@ pub fn tree(boxes: &[Aabb], triangles: &impl Triangles, budget: f32, pad: f32) -
 struct Halves {
     left: Vec<Item>,
     right: Vec<Item>,
-    /// What is left of the budget on either side.
+    /// Budgets of spare references that are left on either side.
     budgets: [usize; 2],
 }
 
@@ -108,7 +112,8 @@ impl<T: Triangles> Builder<'_, T> {
         shared(items, right, budget)
     }
 
-    /// The cheapest plane among equally spaced ones, if it costs less than `cost`: axis, position and both sides' boxes.
+    /// The cheapest plane among equally spaced ones, if it costs less than `cost`: axis, position
+    /// and both sides' boxes.
     fn plane(&self, items: &[Item], bounds: Bounds, budget: usize, cost: f32) -> Option<Plane> {
         let mut best: Option<(f32, Plane)> = None;
         for axis in 0..3 {
@@ -119,6 +124,8 @@ impl<T: Triangles> Builder<'_, T> {
             }
             let place = |b: usize| low + extent * (b as f32 / BINS as f32);
             let bin = |x: f32| (((x - low) * scale) as usize).min(BINS - 1);
+
+            // each bin's bounds of the parts of triangles in it, and how many begin and end there
             let mut bins = [Bounds::EMPTY; BINS];
             let (mut enter, mut leave) = ([0u32; BINS], [0u32; BINS]);
             for item in items {
@@ -141,12 +148,16 @@ impl<T: Triangles> Builder<'_, T> {
                     }
                 });
             }
+
+            // bounds of everything to the right of each plane
             let mut right = [Bounds::EMPTY; BINS];
             let mut sum = Bounds::EMPTY;
             for b in (1..BINS).rev() {
                 sum = sum.union(bins[b]);
                 right[b] = sum;
             }
+
+            // planes from left to right: the cheapest within the budget
             let (mut left, mut n_left, mut n_right) = (Bounds::EMPTY, 0, items.len() as u32);
             for b in 1..BINS {
                 left = left.union(bins[b - 1]);
@@ -165,7 +176,8 @@ impl<T: Triangles> Builder<'_, T> {
         best.map(|b| b.1)
     }
 
-    /// References on either side of a plane. None if that brings no progress, or more references than the budget has.
+    /// References on either side of a plane. None if that brings no progress, or more references
+    /// than the budget has.
     fn cut(&self, items: &[Item], plane: Plane, budget: usize) -> Option<(Vec<Item>, Vec<Item>)> {
         let Plane { axis, at, mut sides, counts } = plane;
         let mut counts = counts.map(|c| c as f32);
@@ -176,6 +188,7 @@ impl<T: Triangles> Builder<'_, T> {
             b
         };
         for item in items {
+            // references on one side of the plane stay whole
             let b = item.bounds();
             if b.max[axis] <= at {
                 left.push(*item);
@@ -185,6 +198,7 @@ impl<T: Triangles> Builder<'_, T> {
                 right.push(*item);
                 continue;
             }
+
             // unsplitting: whole on one side may be cheaper than in halves on both
             let both = sides[0].half_area() * counts[0] + sides[1].half_area() * counts[1];
             let (l, r) = (with(sides[0], item), with(sides[1], item));
@@ -200,6 +214,8 @@ impl<T: Triangles> Builder<'_, T> {
                 (sides[1], counts[0]) = (r, counts[0] - 1.0);
                 continue;
             }
+
+            // the reference becomes two, each bounded by its part of the triangle
             let (mut low, mut high) = (b, b);
             low.max[axis] = at;
             high.min[axis] = at;
@@ -214,6 +230,8 @@ impl<T: Triangles> Builder<'_, T> {
                 }
             }
         }
+
+        // a split that separates nothing would never end
         let n = items.len();
         let progress = left.len().max(right.len()) < n && !left.is_empty() && !right.is_empty();
         (progress && left.len() + right.len() <= n + budget).then_some((left, right))
@@ -225,8 +243,8 @@ impl<T: Triangles> Builder<'_, T> {
     }
 }
 
-/// Approximate bounding box of a triangle clipped to a slab between two planes across an axis, good enough to compare costs. The
-/// corners of the clipped part lie on the triangle's edges.
+/// Approximate bounding box of a triangle clipped to a slab between two planes across an axis, good
+/// enough to compare costs. The corners of the clipped part lie on the triangle's edges.
 #[inline(always)]
 fn slab(t: &[Vec3; 3], axis: usize, low: f32, high: f32) -> Bounds {
     let mut out = Bounds::EMPTY;

@@ -1,14 +1,18 @@
-//! The hierarchy that `shaders/trace/wide.glsl` traverses: up to seven children a node, boxes quantised to eight bits a plane (after
-//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed WideBvh BVHs", HPG 2017).
+//! The hierarchy that `shaders/trace/wide.glsl` traverses: up to seven children a node, boxes
+//! quantised to eight bits a plane (after Ylitie, Karras, Laine, "Efficient Incoherent Ray
+//! Traversal on GPUs Through Compressed WideBvh BVHs", HPG 2017).
 //!
-//! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node are adjacent. So a group of
-//! siblings is encoded as one index and a few bits, and one fetch serves a node or a leaf alike. Which nodes of the binary tree become wide ones is chosen
-//! by dynamic programming for the least expected number of blocks that a ray visits (the paper's section 3.1 with one kind of leaf).
+//! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node are
+//! adjacent. So a group of siblings is encoded as one index and a few bits, and one fetch serves a
+//! node or a leaf alike. Which nodes of the binary tree become wide ones is chosen by dynamic
+//! programming for the least expected number of blocks that a ray visits (the paper's section 3.1
+//! with one kind of leaf).
 //!
-//! [`WideNode`] is a node; the layout of a leaf is up to the caller, except for the flag in the last word of its [`Block`].
+//! [`WideNode`] is a node; the layout of a leaf is up to the caller, except for the flag in the
+//! last word of its [`Block`].
 //!
-//! The traversal's stack cannot overflow: a node visit pushes at most one entry (the rest of a group of siblings), so a
-//! tree needs as many entries as its longest path has nodes.
+//! The traversal's stack cannot overflow: a node visit pushes at most one entry (the rest of a
+//! group of siblings), so a tree needs as many entries as its longest path has nodes.
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
@@ -34,7 +38,8 @@ pub struct WideBvh {
     pub depth: u32,
     /// Bounds of the tree; `None` if it is empty.
     pub bounds: Option<Aabb>,
-    /// Expected number of blocks that a ray through the bounds visits, by the surface area heuristic.
+    /// Expected number of blocks that a ray through the bounds visits, by the surface area
+    /// heuristic.
     pub sah_cost: f64,
 }
 
@@ -54,12 +59,13 @@ impl Default for WideBvh {
 }
 
 impl WideBvh {
-    /// Collapses a binary tree whose leaves hold one item each, and whose boxes are padded by what quantisation and traversal round
-    /// away. `leaf` returns the block of an item.
+    /// Collapses a binary tree whose leaves hold one item each, and whose boxes are padded by what
+    /// quantisation and traversal round away. `leaf` returns the block of an item.
     pub fn collapse(tree: &Bvh2, leaf: impl Fn(u32) -> Block + Sync) -> Self {
         if tree.nodes.is_empty() {
             return Self::default();
         }
+
         // subtrees that are collapsed on their own, and the rest above them
         let mut frontier = vec![0usize];
         while frontier.len() < TASKS && tree.nodes.len() > 16 * TASKS {
@@ -77,6 +83,8 @@ impl WideBvh {
                 .collect();
         }
         frontier.retain(|&n| n != 0 && !tree.nodes[n].is_leaf());
+
+        // the pieces in parallel, then the top, which needs their costs
         let pieces: Vec<Piece> = frontier.par_iter().map(|&n| Piece::collapse(tree, n, &[], &[], &leaf)).collect();
         let mut sorted: Vec<(usize, usize)> = frontier.iter().copied().zip(0..).collect();
         sorted.sort_unstable();
@@ -85,6 +93,7 @@ impl WideBvh {
         // a single leaf has a node above it
         let blocks = if tree.nodes[0].is_leaf() { 2.0 } else { 1.0 };
         let mut out = Self { blocks: top.blocks, depth: top.depth, bounds: Some(bounds), sah_cost: (blocks * top.cost) as f64 };
+
         // the pieces' roots have their places; the rest of each follows
         let mut ends = Vec::with_capacity(pieces.len());
         let mut end = out.blocks.len();
@@ -96,6 +105,8 @@ impl WideBvh {
             end += p.blocks.len() - 1;
         }
         out.blocks.resize(end, Block::default());
+
+        // each piece writes its own part of the blocks
         let mut rest = &mut out.blocks[ends.first().map_or(end, |e| e.1)..];
         let mut targets = Vec::new();
         for &(piece, begin) in &ends {
@@ -111,9 +122,11 @@ impl WideBvh {
         out
     }
 
-    /// Checks that every block is reached once and every child exists, that leaves lie within the boxes above them, and that the depth is as recorded and at most
-    /// [`MAX_DEPTH`]. Nothing in the tree is trusted; the time is linear in its size. `bounds_of` returns the bounds of a leaf's primitives, or the empty box where
-    /// they may stick out (a leaf that holds a part of them). Returns the bounds of all leaves together.
+    /// Checks that every block is reached once and every child exists, that leaves lie within the
+    /// boxes above them, and that the depth is as recorded and at most [`MAX_DEPTH`]. Nothing in
+    /// the tree is trusted; the time is linear in its size. `bounds_of` returns the bounds of a
+    /// leaf's primitives, or the empty box where they may stick out (a leaf that holds a part of
+    /// them). Returns the bounds of all leaves together.
     ///
     /// # Errors
     /// A description of the first defect.
@@ -137,6 +150,8 @@ impl WideBvh {
                 work.extend(children(block).map(|(slot, child)| (child, at, slot, level + 1)));
             }
         }
+
+        // every block is reached, at the recorded depth
         if let Some(at) = seen.iter().position(|s| !s) {
             return Err(format!("block {at} is never reached"));
         }
@@ -144,7 +159,8 @@ impl WideBvh {
             return Err(format!("depth is {deepest}, recorded as {}; at most {MAX_DEPTH}", self.depth));
         }
 
-        // children before parents: what is below a block lies within the box that its parent has for it
+        // children before parents: what is below a block lies within the box that its parent has
+        // for it
         let of_leaf = |b: &Block| if is_leaf(b) { bounds_of(b) } else { Aabb::EMPTY };
         let mut below: Vec<Aabb> = self.blocks.par_iter().map(of_leaf).collect();
         for &(at, parent, slot) in order.iter().rev() {
@@ -223,13 +239,15 @@ struct Local {
     cost: [f32; WIDTH],
 }
 
-/// Least cost of two subtrees as at most `count` wide ones together (two or more), and how many of those on the left.
+/// Least cost of two subtrees as at most `count` wide ones together (two or more), and how many of
+/// those on the left.
 fn split(left: &[f32; WIDTH], right: &[f32; WIDTH], count: usize) -> (f32, usize) {
     let cost = |k: usize| (left[k - 1] + right[count - k - 1], k);
     (2..count).map(cost).fold(cost(1), |a, b| if b.0 < a.0 { b } else { a })
 }
 
-/// Area of a box as a share of a larger one's, whatever the scale: areas alone leave the range of a float at 1e19 and at 1e-20.
+/// Area of a box as a share of a larger one's, whatever the scale: areas alone leave the range of a
+/// float at 1e19 and at 1e-20.
 fn share(of: Aabb, whole: Aabb) -> f32 {
     let area = |b: Aabb| {
         let d = (b.max.as_dvec3() - b.min.as_dvec3()).max(glam::DVec3::ZERO);
@@ -248,6 +266,7 @@ impl Piece {
         pieces: &[Piece],
         leaf: &(impl Fn(u32) -> Block + Sync),
     ) -> Self {
+        // a copy of the subtree, which ends at the roots of other pieces
         let whole = node_box(tree, 0);
         let cut = |n: u32| cuts.binary_search_by_key(&(n as usize), |c| c.0).ok().map(|k| cuts[k].1);
         let mut locals = vec![Local { node: root as u32, children: [0; 2], cost: [0.0; WIDTH] }];
@@ -263,6 +282,8 @@ impl Piece {
             locals.extend([0, 1].map(|c| Local { node: node.first_index + c, children: [0; 2], cost: [0.0; WIDTH] }));
             work.extend([at + 1, at]);
         }
+
+        // children before parents: the least cost of covering each subtree with 1 to 8 children
         for k in (0..locals.len()).rev() {
             let area = share(node_box(tree, locals[k].node as usize), whole);
             locals[k].cost = match locals[k].children {
@@ -278,6 +299,8 @@ impl Piece {
                 }
             };
         }
+
+        // blocks from the root down: each node opens the children that its least cost asks for
         let mut out = Self { blocks: vec![Block::default()], depth: 1, cost: locals[0].cost[0], inserts: Vec::new() };
         let mut work = vec![(0usize, 0usize, 1u32)];
         let (mut found, mut open) = (Vec::new(), Vec::new());
@@ -299,6 +322,8 @@ impl Piece {
                     if count == 1 { found.push(child) } else { open.push((locals[child].children, count)) }
                 }
             }
+
+            // slots are in the order of the octants, in which rays visit them
             let mut boxes = [(0usize, Aabb::EMPTY); WIDTH];
             let boxes = &mut boxes[..found.len()];
             for (b, &child) in boxes.iter_mut().zip(&found) {
@@ -309,6 +334,8 @@ impl Piece {
             let mut order: [usize; WIDTH] = std::array::from_fn(|k| k);
             let order = &mut order[..found.len()];
             order.sort_unstable_by_key(|&k| boxes[k].0);
+
+            // children lie side by side: leaves at once, nodes when their turn comes
             let first = out.blocks.len();
             out.blocks[at] = node(bounds, boxes, first as u32);
             for (place, &j) in (first..).zip(&*order) {
@@ -330,8 +357,9 @@ impl Piece {
     }
 }
 
-/// Gives each child the slot whose direction from the node's middle is most its own, so that going through the slots in the order of
-/// a ray's octant meets near children first (Ylitie et al., section 3.2; greedily).
+/// Gives each child the slot whose direction from the node's middle is most its own, so that going
+/// through the slots in the order of a ray's octant meets near children first (Ylitie et al.,
+/// section 3.2; greedily).
 fn assign_slots(children: &mut [(usize, Aabb)], parent: Aabb) {
     let middle = parent.min + parent.max;
     let mut free = (1u32 << WIDTH) - 1;
@@ -361,7 +389,8 @@ fn assign_slots(children: &mut [(usize, Aabb)], parent: Aabb) {
     }
 }
 
-/// A node over its children's boxes by slot, whose blocks begin at `first`: planes are rounded outwards.
+/// A node over its children's boxes by slot, whose blocks begin at `first`: planes are rounded
+/// outwards.
 pub(super) fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Block {
     let (mut lower, mut upper, mut present) = ([[0u8; WIDTH + 1]; 3], [[0u8; WIDTH + 1]; 3], 0u8);
     for axis in 0..3 {

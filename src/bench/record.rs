@@ -364,7 +364,7 @@ mod tests {
 
     fn record() -> Record {
         let mut record = Record { benchmark: BenchKind::Frames, ..Record::default() };
-        let times = Percentiles::of(&[1.0, 2.0, 4.0]);
+        let times = Percentiles::from_values(&[1.0, 2.0, 4.0]);
         let mut row = record.row("a.glb", "still", "fast, or so");
         row.repeated(quantity::FRAME_TIME, times).exact(quantity::RMSE, f64::NAN).exact(quantity::FLICKER, None);
         row.at(FRAME, 8.0).exact(quantity::RMSE.not_compared(), 0.25);

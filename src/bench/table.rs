@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn a_table_has_a_row_a_contestant_and_a_column_a_quantity() {
         let mut record = Record::default();
-        record.row("a", "still", "fast").repeated(quantity::FRAME_TIME, Percentiles::of(&[1.0, 2.0, 4.0]));
+        record.row("a", "still", "fast").repeated(quantity::FRAME_TIME, Percentiles::from_values(&[1.0, 2.0, 4.0]));
         let mut row = record.row("a", "still", "quality");
         row.exact(quantity::RMSE, 0.25).exact(quantity::FLICKER, f64::INFINITY);
         (1..=20).for_each(|k| {

@@ -1,4 +1,5 @@
-//! The arguments of each command, checked as far as possible without a scene or a device. `render` has its own file.
+//! The arguments of each command, checked as far as possible without a scene or a device. `render`
+//! has its own file.
 
 use std::path::PathBuf;
 

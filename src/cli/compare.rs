@@ -159,7 +159,8 @@ enum Source {
 }
 
 impl CompareArgs {
-    /// The images in order: A and B, which `--a` and `--b` or the first files are, then the other files, then those of `--c`.
+    /// The images in order: A and B, which `--a` and `--b` or the first files are, then the other
+    /// files, then those of `--c`.
     fn sources(&self) -> Vec<Source> {
         let mut files = self.images.iter().cloned().map(Source::File);
         let first = [&self.a, &self.b].map(|words| words.clone().map(Source::Render).or_else(|| files.next()));
@@ -184,8 +185,8 @@ impl CompareArgs {
         }
     }
 
-    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders, and which files are read and written. Adds first frames to
-    /// the sources.
+    /// Checks what can be checked before anything is loaded or rendered, and returns the settings
+    /// of the renders, and which files are read and written. Adds first frames to the sources.
     fn check(&self, sources: &mut Vec<Source>) -> Result<(Vec<RenderSettings>, FilePlan)> {
         // `--c` or `--b` alone would otherwise move up
         if self.b.is_some() && sources.len() == 1 {
@@ -246,7 +247,8 @@ impl CompareArgs {
         Ok(plan)
     }
 
-    /// Adds the first frame of each preset that is judged at rest: what filters and histories do shows there.
+    /// Adds the first frame of each preset that is judged at rest: what filters and histories do
+    /// shows there.
     fn add_first_frames(&self, sources: &mut Vec<Source>, settings: &mut Vec<RenderSettings>) {
         let renders =
             sources.iter().enumerate().filter_map(|(k, s)| if let Source::Render(w) = s { Some((k, w)) } else { None });
@@ -325,6 +327,8 @@ fn entries(
     let budget = Budget::default();
     let loaded = files.iter().map(|p| output::load_within(p, &budget)).collect::<Result<Vec<_>>>()?;
     let mut loaded = loaded.into_iter().zip(files.iter().zip(short_names(&files)));
+
+    // the scene is opened once for all renders
     let mut renderer = match (&args.scene, settings.is_empty()) {
         (Some(scene), false) => {
             interrupt::install();
@@ -334,6 +338,8 @@ fn entries(
         }
         _ => None,
     };
+
+    // entries in the order of the command line
     let mut settings = settings.into_iter();
     let mut entries: Vec<Entry> = Vec::new();
     let mut rendered: Vec<(usize, RenderSettings)> = Vec::new();
@@ -367,6 +373,8 @@ fn entries(
             }
         });
     }
+
+    // renders that are equal in every bit are likely a mistake
     for (n, (k, ours)) in rendered.iter().enumerate() {
         let twin = rendered[..n].iter().find(|(j, theirs)| ours != theirs && is_same(&entries[*k].image, &entries[*j].image));
         if let Some((j, _)) = twin {
@@ -426,17 +434,20 @@ mod tests {
 
     #[test]
     fn renders_take_their_letters_and_files_the_others() {
-        let of = |line: &str| -> Vec<String> {
+        let names = |line: &str| -> Vec<String> {
             let name = |s| match s {
                 Source::File(path) => path.display().to_string(),
                 Source::Render(words) => format!("<{words}>"),
             };
             parse(line).sources().into_iter().map(name).collect()
         };
-        assert_eq!(of("compare x.exr y.exr z.exr"), ["x.exr", "y.exr", "z.exr"]);
-        assert_eq!(of("compare --scene s --b path --a ao"), ["<ao>", "<path>"]);
-        assert_eq!(of("compare x.exr --scene s --a ao"), ["<ao>", "x.exr"]);
-        assert_eq!(of("compare x.exr y.exr --scene s --b path --c ao --c lit"), ["x.exr", "<path>", "y.exr", "<ao>", "<lit>"]);
+        assert_eq!(names("compare x.exr y.exr z.exr"), ["x.exr", "y.exr", "z.exr"]);
+        assert_eq!(names("compare --scene s --b path --a ao"), ["<ao>", "<path>"]);
+        assert_eq!(names("compare x.exr --scene s --a ao"), ["<ao>", "x.exr"]);
+        assert_eq!(
+            names("compare x.exr y.exr --scene s --b path --c ao --c lit"),
+            ["x.exr", "<path>", "y.exr", "<ao>", "<lit>"]
+        );
     }
 
     #[test]

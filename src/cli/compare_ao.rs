@@ -1,4 +1,5 @@
-//! `skylit compare ao-vs-path`: is ambient occlusion a stand-in for global illumination in a view, and with which radius, falloff and ambient colour?
+//! `skylit compare ao-vs-path`: is ambient occlusion a stand-in for global illumination in a view,
+//! and with which radius, falloff and ambient colour?
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -222,12 +223,13 @@ fn lines(report: &Report, seconds: f64) -> Vec<String> {
     }
     if let Some(fit) = report.path.first() {
         lines.push(String::new());
-        lines.push(match fit.best.rmse > 0.0 {
-            true => format!(
+        lines.push(if fit.best.rmse > 0.0 {
+            format!(
                 "two images that differ by the RMSE of the best, {}, over the pixels that show surfaces, and by their noise:",
                 significant(fit.best.rmse)
-            ),
-            false => "two images that differ by less than the noise of these samples tells:".to_owned(),
+            )
+        } else {
+            "two images that differ by less than the noise of these samples tells:".to_owned()
         });
         lines.extend(report.commands.iter().cloned());
     }

@@ -1,4 +1,5 @@
-//! `skylit completions`: scripts by which shells complete commands, options, values and names of built-in scenes.
+//! `skylit completions`: scripts by which shells complete commands, options, values and names of
+//! built-in scenes.
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command, ValueHint};
@@ -35,7 +36,8 @@ const SCENE_COMMANDS: &str = "render view export rays compare bench";
 /// Stands for the values of such an argument where the shell gets a function in place of a list.
 const PLACEHOLDER: &str = "SCENES";
 
-/// Bash splits words at colons: they are joined again for the function that clap has written, and what stands before the colon is not repeated.
+/// Bash splits words at colons: they are joined again for the function that clap has written, and
+/// what stands before the colon is not repeated.
 const BASH_COLONS: &str = r#"
 _skylit_colons() {
     local words=() word= previous= index= cword=0 joined=
@@ -92,10 +94,13 @@ fn script(shell: Shell) -> String {
 
 /// The definition with these values of arguments that name scenes.
 fn with_scenes(command: Command, values: &[&'static str]) -> Command {
-    let command = command.mut_args(|arg| match SCENES.contains(&arg.get_id().as_str()) {
-        // with a hint of files bash would take the list for one value
-        true => arg.value_hint(ValueHint::Unknown).value_parser(PossibleValuesParser::new(values.to_vec())),
-        false => arg,
+    let command = command.mut_args(|arg| {
+        if SCENES.contains(&arg.get_id().as_str()) {
+            // with a hint of files bash would take the list for one value
+            arg.value_hint(ValueHint::Unknown).value_parser(PossibleValuesParser::new(values.to_vec()))
+        } else {
+            arg
+        }
     });
     command.mut_subcommands(|c| with_scenes(c, values))
 }

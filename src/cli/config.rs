@@ -1,4 +1,5 @@
-//! Files of defaults on the command line: `--no-config`, and what is said of what was taken from them.
+//! Files of defaults on the command line: `--no-config`, and what is said of what was taken from
+//! them.
 
 use clap::Args;
 
@@ -18,7 +19,8 @@ pub struct ConfigArgs {
 }
 
 impl ConfigArgs {
-    /// The files of defaults for a scene; `confine`: where the files lie that the one beside it may name.
+    /// The files of defaults for a scene; `confine`: where the files lie that the one beside it may
+    /// name.
     ///
     /// # Errors
     /// Those of [`defaults::find`].

@@ -1,4 +1,5 @@
-//! `skylit diff`: do two images agree? Compares their colour, or the channels that are named, and lists the other channels that both have.
+//! `skylit diff`: do two images agree? Compares their colour, or the channels that are named, and
+//! lists the other channels that both have.
 
 use serde_json::json;
 
@@ -19,7 +20,8 @@ struct ChannelDifference {
     pixels: u64,
     /// Pixels whose values differ.
     differing: u64,
-    /// Pixels where one image is finite and the other is not, or where they are not finite in different ways.
+    /// Pixels where one image is finite and the other is not, or where they are not finite in
+    /// different ways.
     broken: u64,
     /// The metrics of [`crate::measure::metrics`]; ids have none.
     #[serde(flatten)]
@@ -72,7 +74,8 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     console.close(&record, judge(&compared, args.max_rmse))
 }
 
-/// Fails if nothing can be compared, a pixel is broken, or a compared channel differs by more than the limit, if there is one.
+/// Fails if nothing can be compared, a pixel is broken, or a compared channel differs by more than
+/// the limit, if there is one.
 fn judge(compared: &Comparison, limit: Option<f64>) -> Result<()> {
     compared.check()?;
     let Some(limit) = limit else { return Ok(()) };
@@ -101,24 +104,28 @@ fn difference_text(d: &ChannelDifference) -> String {
     text
 }
 
-/// What was compared, in a line.
+/// Returns a line that says which images were compared.
 fn summary(c: &Comparison) -> String {
     if c.pixels == 0 {
         return format!("{}: no pixel to compare, over {}", c.channels.join(" "), c.mask);
     }
     let error = if c.bias_standard_error > 0.0 { format!(" +- {:.1e}", c.bias_standard_error) } else { String::new() };
-    let mut parts = match c.rmse == 0.0 {
-        true => vec!["rmse 0".to_owned()],
-        false => vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)],
+    let mut parts = if c.rmse == 0.0 {
+        vec!["rmse 0".to_owned()]
+    } else {
+        vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)]
     };
     parts.extend(c.ssim.map(|v| format!("ssim {v:.4}")));
     parts.extend(c.flip.map(|v| format!("flip {v:.4}")));
     parts.extend(c.flip_hdr.map(|v| format!("flip over exposures {v:.4}")));
     parts.extend(c.bad.outliers.map(|n| format!("outliers {n}")));
-    parts.extend(c.reference_standard_error.map(|e| match e < c.rmse {
-        true => format!("standard error of the reference {e:.1e}"),
-        // of which the RMSE is a part
-        false => format!("standard error of the reference {e:.1e}, so that the true RMSE is at most about as large"),
+    parts.extend(c.reference_standard_error.map(|e| {
+        if e < c.rmse {
+            format!("standard error of the reference {e:.1e}")
+        } else {
+            // of which the RMSE is a part
+            format!("standard error of the reference {e:.1e}, so that the true RMSE is at most about as large")
+        }
     }));
     format!("{}: {}, over {}", c.channels.join(" "), parts.join(", "), c.mask)
 }
@@ -191,23 +198,28 @@ mod tests {
 
     #[test]
     fn errors_are_said_as_they_are_meant() {
-        let of = |rmse, reference_standard_error| {
+        let line = |rmse, reference_standard_error| {
             let channels = vec!["R".to_owned()];
             summary(&Comparison { rmse, reference_standard_error, channels, mask_pixels: 1, pixels: 1, ..Default::default() })
         };
-        assert!(of(0.0, None).starts_with("R: rmse 0, over"), "{}", of(0.0, None));
-        assert!(of(0.02, Some(1e-3)).contains("rmse 2.000e-2, bias +0.000e0, standard error of the reference 1.0e-3, over"));
-        assert!(of(0.02, Some(3e-2)).contains("so that the true RMSE is at most about as large"));
+        assert!(line(0.0, None).starts_with("R: rmse 0, over"), "{}", line(0.0, None));
+        assert!(line(0.02, Some(1e-3)).contains("rmse 2.000e-2, bias +0.000e0, standard error of the reference 1.0e-3, over"));
+        assert!(line(0.02, Some(3e-2)).contains("so that the true RMSE is at most about as large"));
     }
 
     #[test]
     fn limits_hold_for_each_channel_and_no_broken_pixel_passes() {
-        let of = |channel_rmse: Vec<f64>, nan| {
+        let passes = |channel_rmse: Vec<f64>, nan| {
             let bad = comparison::BadPixels { nan, ..Default::default() };
             judge(&Comparison { channel_rmse, bad, mask_pixels: 1, pixels: 1, ..Default::default() }, Some(0.1)).is_ok()
         };
-        assert!(of(vec![0.1, 0.0], 0));
-        assert!(!of(vec![0.0, 0.11], 0) && !of(vec![0.0], 1) && !of(vec![f64::NAN], 0) && !of(vec![0.0, f64::NAN], 0));
+        assert!(passes(vec![0.1, 0.0], 0));
+        assert!(
+            !passes(vec![0.0, 0.11], 0)
+                && !passes(vec![0.0], 1)
+                && !passes(vec![f64::NAN], 0)
+                && !passes(vec![0.0, f64::NAN], 0)
+        );
         // without a limit differences are no failure, but a comparison of nothing is
         let pixels = |mask_pixels, pixels| judge(&Comparison { mask_pixels, pixels, ..Default::default() }, None);
         assert!(pixels(2, 1).is_ok());

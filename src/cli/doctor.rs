@@ -60,9 +60,13 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         text.push_str(&console::visible(&s, &[]));
         text.push('\n');
     };
+
+    // the device and its driver
     let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (selected)" } else { "" };
     line(format!("device {}: {}, {}{mark}", d.index, d.name, d.kind));
     line(format!("  driver   {}, Vulkan {}", d.driver, d.api_version));
+
+    // limits
     let l = &d.limits;
     let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
     line(format!(
@@ -80,6 +84,8 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
             l.shader_group_handle_size, l.shader_group_handle_alignment, l.shader_group_base_alignment, l.scratch_alignment,
         ));
     }
+
+    // features, and what each tracer lacks
     match d.missing_floor.as_slice() {
         [] => line("  required features: all available".into()),
         missing => line(format!("  required features: lacks {}; skylit cannot use this device", missing.join(", "))),

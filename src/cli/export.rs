@@ -10,7 +10,8 @@ use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
 
-/// Checks the files that are written beside a `.gltf`: they replace no file of the scene and, without `--force`, none that no earlier export to the same name has written.
+/// Checks the files that are written beside a `.gltf`: they replace no file of the scene and,
+/// without `--force`, none that no earlier export to the same name has written.
 fn check_companions(args: &ExportArgs, mut plan: FilePlan, scene: &Scene, output: &Path) -> Result<()> {
     let companions = export::companions(scene, output);
     companions.iter().for_each(|path| plan.writes("a file beside the output", path));

@@ -1,6 +1,7 @@
-//! The command line as a whole, and its three helps: `-h` has what most people use, `--help` all but what is for research, `--help-all` everything.
-//! Which help lists an option is said where the option is declared: settings by their [`crate::settings::Level`], others by `hide_short_help` and
-//! `hide_long_help`.
+//! The command line as a whole, and its three helps: `-h` has what most people use, `--help` all
+//! but what is for research, `--help-all` everything. Which help lists an option is said where the
+//! option is declared: settings by their [`crate::settings::Level`], others by `hide_short_help`
+//! and `hide_long_help`.
 
 use std::ffi::OsString;
 

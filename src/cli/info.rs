@@ -63,15 +63,17 @@ struct Suggestions {
     size: [u32; 2],
     /// Options of `skylit render` that choose the camera that it chooses by itself.
     camera: String,
-    /// Options of `skylit render --integrator path` that light the scene as it does by itself; absent for a scene that has light.
+    /// Options of `skylit render --integrator path` that light the scene as it does by itself;
+    /// absent for a scene that has light.
     light: Option<String>,
     /// Share of occlusion rays of surfaces in view that get out of the scene.
     ao_mean: Option<f64>,
-    /// What `--ao-radius auto` is, scene units; absent for no limit.
+    /// Radius that `--ao-radius auto` stands for, scene units; absent for no limit.
     ao_radius: Option<f64>,
     /// Exposure of path-traced images, stops.
     exposure: Option<f64>,
-    /// What `skylit render` chooses for images of this size where options leave it open, a sentence each, and the options that choose the same.
+    /// Choices of `skylit render` for images of this size where options leave them open: a sentence
+    /// each, and the options that choose the same.
     choices: Vec<String>,
 }
 
@@ -95,7 +97,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
-    let inventory = Inventory::of(&scene);
+    let inventory = Inventory::from_scene(&scene);
     let format = format_of(&args.scene);
     let extensions = scene.report.extensions.clone();
     describe(&inventory, &scene, format).iter().try_for_each(|line| console.line(line))?;
@@ -150,11 +152,15 @@ fn unit(format: &str) -> &'static str {
 fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     let mut lines = Vec::new();
     let mut add = |name: &str, text: String| lines.push(format!("{name:<12}{text}"));
+
+    // extent
     add("scene", format!("{}, {format}; unit of lengths: {}", scene.name, unit(format)));
     if let Some([lo, hi]) = i.bounds {
         let corner = |c: [f64; 3]| c.map(significant).join(", ");
         add("bounds", format!("{} to {}, diagonal {}", corner(lo), corner(hi), significant(i.diagonal)));
     }
+
+    // geometry and surfaces
     let instanced =
         if i.triangles == i.unique_triangles { String::new() } else { format!(" ({} unique)", grouped(i.unique_triangles)) };
     let spheres = if i.spheres > 0 { format!(", {}", counted(i.spheres, "sphere", "spheres")) } else { String::new() };
@@ -167,6 +173,7 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
             counted(i.meshes as u64, "mesh", "meshes")
         ),
     );
+
     let edges = if i.open_edges > 0 {
         format!(
             "{}; {} of {} meshes are closed",
@@ -183,6 +190,8 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         String::new()
     };
     add("surfaces", format!("{edges}{dropped}"));
+
+    // materials and textures
     let joined = |all: &mut dyn Iterator<Item = (String, usize)>| {
         all.map(|(name, n)| format!("{n} {name}")).collect::<Vec<_>>().join(", ")
     };
@@ -201,6 +210,8 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
             ),
         );
     }
+
+    // cameras, lights and animations
     let named = |name: &String| if name.is_empty() { "without a name".to_owned() } else { name.clone() };
     add(
         "cameras",
@@ -216,14 +227,16 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         let targets = if i.morph_targets > 0 { format!("; {} morph targets", i.morph_targets) } else { String::new() };
         add("animations", format!("{}{skins}{targets}", if animations.is_empty() { "none" } else { &animations }));
     }
+
+    // what the file requires of programs
     let extensions = &scene.report.extensions;
     if !extensions.is_empty() {
-        let of = |e: &crate::scene::FileExtension| {
+        let noted = |e: &crate::scene::FileExtension| {
             let notes: Vec<&str> =
                 [(e.required, "required"), (e.ignored, "ignored")].into_iter().filter(|n| n.0).map(|n| n.1).collect();
             if notes.is_empty() { e.name.clone() } else { format!("{} ({})", e.name, notes.join(", ")) }
         };
-        add("extensions", extensions.iter().map(of).collect::<Vec<_>>().join(", "));
+        add("extensions", extensions.iter().map(noted).collect::<Vec<_>>().join(", "));
     }
     lines
 }
@@ -238,6 +251,7 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     // what is chosen for images of this size
     let by_itself = renderer.complete(&requested, None)?;
     let size = by_itself.settings.size(renderer.scene());
+
     let mut settings =
         RenderSettings { scene: args.meaning.clone(), camera: by_itself.chosen.camera.clone(), ..Default::default() };
     if !settings.camera.chooses() {
@@ -267,6 +281,7 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     let mut choices = by_itself.choices;
     choices.extend(lit.choices.into_iter().filter(|c| c.starts_with("light")));
 
+    // a few frames, to say how long one takes
     progress.set(3, 4);
     let mut frames = RenderSettings { scene: args.meaning.clone(), camera: settings.camera.clone(), ..Default::default() };
     frames.image.size = Some(FRAME_SIZE);
@@ -278,6 +293,7 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
         control.should_stop()?;
     }
     let report = frames.report();
+
     let on_device = OnDevice {
         device: report.setup.device.clone(),
         tracer: report.setup.tracer.to_string(),
@@ -373,11 +389,11 @@ fn counted(count: u64, one: &str, several: &str) -> String {
 /// 1,234,567.
 fn grouped(value: u64) -> String {
     let digits = value.to_string();
-    let of = |(k, c): (usize, char)| {
+    let digit = |(k, c): (usize, char)| {
         let comma = k > 0 && (digits.len() - k).is_multiple_of(3);
         comma.then_some(',').into_iter().chain([c])
     };
-    digits.chars().enumerate().flat_map(of).collect()
+    digits.chars().enumerate().flat_map(digit).collect()
 }
 
 #[cfg(test)]

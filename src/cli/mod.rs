@@ -1,5 +1,5 @@
-//! The command line: one file per command. Every failure ends as one line on stderr (and a record on stdout with `--json`) and
-//! an exit code of [`EXIT_CODES`].
+//! The command line: one file per command. Every failure ends as one line on stderr (and a record
+//! on stdout with `--json`) and an exit code of [`EXIT_CODES`].
 
 mod args;
 #[cfg(feature = "compare")]
@@ -129,7 +129,8 @@ pub fn run() -> ExitCode {
 /// Most threads that commands share.
 const MAX_THREADS: usize = 1024;
 
-/// Starts the threads that commands share, fewer than there are processors where the system has no room for more: without them the first use would panic.
+/// Starts the threads that commands share, fewer than there are processors where the system has no
+/// room for more: without them the first use would panic.
 fn start_threads() -> Result<()> {
     crate::gpu::host_memory::check_room_to_start();
     let requested = std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse::<usize>().ok()).filter(|n| *n > 0);
@@ -192,7 +193,8 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Adds the command `view` where none is given: `skylit` alone, on a machine with a display, and `skylit SCENE`.
+/// Adds the command `view` where none is given: `skylit` alone, on a machine with a display, and
+/// `skylit SCENE`.
 fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     #[cfg(feature = "viewer")]
     {
@@ -210,8 +212,9 @@ fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
-/// `skylit bench ... --json FILE.json` means `--json=FILE.json`: elsewhere what follows `--json` is a scene, but no scene's name ends in .json. Those of records
-/// do: `skylit bench report` reads them.
+/// `skylit bench ... --json FILE.json` means `--json=FILE.json`: elsewhere what follows `--json` is
+/// a scene, but no scene's name ends in .json. Those of records do: `skylit bench report` reads
+/// them.
 fn with_json_file(mut arguments: Vec<OsString>) -> Vec<OsString> {
     if arguments.get(1).is_some_and(|a| a == "bench") && arguments.get(2).is_none_or(|a| a != "report") {
         let is_file = |name: &OsString| Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -273,25 +276,25 @@ mod tests {
     #[cfg(feature = "viewer")]
     #[test]
     fn a_scene_alone_is_looked_at() {
-        let of = |line: &str| -> Vec<String> {
+        let arguments = |line: &str| -> Vec<String> {
             let words = line.split(' ').map(OsString::from).collect();
             with_view(words).into_iter().map(|w| w.to_string_lossy().into_owned()).collect()
         };
-        assert_eq!(of("skylit builtin:stairs")[1], "view");
-        assert_eq!(of("skylit no/such/file.glb --tracer compute")[1..3], ["view", "no/such/file.glb"]);
+        assert_eq!(arguments("skylit builtin:stairs")[1], "view");
+        assert_eq!(arguments("skylit no/such/file.glb --tracer compute")[1..3], ["view", "no/such/file.glb"]);
         for line in ["skylit render a.glb", "skylit --help", "skylit stairs", "skylit doctor"] {
-            assert_eq!(of(line).join(" "), line);
+            assert_eq!(arguments(line).join(" "), line);
         }
     }
 
     #[test]
     fn a_json_file_needs_no_equals_sign() {
-        let of = |line: &str| -> String {
+        let joined = |line: &str| -> String {
             let words = line.split(' ').map(OsString::from).collect();
             with_json_file(words).iter().map(|w| w.to_string_lossy()).collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(of("skylit bench ao --json a.json scene.glb"), "skylit bench ao --json=a.json scene.glb");
-        assert_eq!(of("skylit bench rays --json dir/A.JSON"), "skylit bench rays --json=dir/A.JSON");
+        assert_eq!(joined("skylit bench ao --json a.json scene.glb"), "skylit bench ao --json=a.json scene.glb");
+        assert_eq!(joined("skylit bench rays --json dir/A.JSON"), "skylit bench rays --json=dir/A.JSON");
         let same = [
             "skylit bench ao --json scene.glb",
             "skylit bench ao a.json",
@@ -299,7 +302,7 @@ mod tests {
             "skylit diff --json a.json b.png",
         ];
         for line in same {
-            assert_eq!(of(line), line);
+            assert_eq!(joined(line), line);
         }
     }
 

@@ -1,4 +1,5 @@
-//! `skylit rays`: traces and times a raw file of rays. The file formats are simple, so that other tracers can read the same files.
+//! `skylit rays`: traces and times a raw file of rays. The file formats are simple, so that other
+//! tracers can read the same files.
 
 use std::io::Write;
 use std::path::Path;
@@ -22,6 +23,8 @@ use crate::tracer::{Needs, Tracer};
 pub fn run(args: &RaysArgs) -> Result<()> {
     args.device.check()?;
     interrupt::install();
+
+    // files are checked before anything is loaded
     let console = args.verbosity.console();
     let mut plan = FilePlan::default();
     plan.reads("--mesh", &args.mesh);
@@ -31,6 +34,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
         plan.check()?;
         files::check_writable(hits)?;
     }
+
+    // rays and the scene, around the same origin
     let mut set = read_rays(&args.rays)?;
     rays::check(&set)?;
     let scene = read_mesh(args)?;
@@ -39,6 +44,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
     translate(&mut set, -flat.origin);
+
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
     // the repeats and one warm-up pass
@@ -46,12 +52,15 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     let stats = tracer.stats();
+
+    // the measurement
     let mut control = ProgressControl { progress: Progress::new("tracing", &console), keep_partial: false };
     let (hits, times) = rays::trace(&tracer, &set, args.mode, args.repeats, &mut control)?;
     drop(control);
     if let Some(path) = &args.hits {
         files::write_atomically(path, |file| file.write_all(bytemuck::cast_slice(&hits)))?;
     }
+
     device.check_validation()?;
     device.save_pipeline_cache();
 
@@ -59,6 +68,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let rate = |seconds: f64| if seconds > 0.0 { set.len() as f64 / seconds / 1e6 } else { 0.0 };
     let middle = |seconds: &[f64]| median(seconds).unwrap_or(0.0);
     let (on_device, on_wall) = (rate(middle(&times.device)), rate(middle(&times.wall)));
+
+    // a line for people, a record for programs
     console.line(&format!(
         "{} rays, {hit_count} hit; tracer {kind}{} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by wall clock \
          (median of {}); built in {:.3} s, {:.1} bytes per primitive",

@@ -101,16 +101,18 @@ impl VerifyArgs {
     }
 
     fn options(&self) -> Result<Options> {
-        let tracers: Option<Tracers> = match self.tracers.is_empty() {
-            true => None,
-            false => Some(parse_tracers(&self.tracers).map_err(|e| Error::Usage(format!("--tracers: {e}")))?),
+        let tracers: Option<Tracers> = if self.tracers.is_empty() {
+            None
+        } else {
+            Some(parse_tracers(&self.tracers).map_err(|e| Error::Usage(format!("--tracers: {e}")))?)
         };
         let selection = Selection { filters: self.filter.clone(), shard: self.shard };
         Ok(Options { selection, action: self.action()?, tracers, seed: self.seed, keep_images: self.html.is_some() })
     }
 }
 
-/// Renders, compares or blesses, and reports. Whatever ends the run early is in the results, too: those of an earlier run must not stay.
+/// Renders, compares or blesses, and reports. Whatever ends the run early is in the results, too:
+/// those of an earlier run must not stay.
 pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
     let loaded = Manifest::load_with(&args.folder, args.confine);
     check_outputs(args, loaded.as_ref().ok())?;
@@ -141,7 +143,8 @@ pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
     console.close(&record, summary.verdict())
 }
 
-/// Checks that results replace nothing that frames are made of or compared with, before a file is touched.
+/// Checks that results replace nothing that frames are made of or compared with, before a file is
+/// touched.
 fn check_outputs(args: &VerifyArgs, manifest: Option<&Manifest>) -> Result<()> {
     let mut plan = FilePlan::default();
     plan.reads("the manifest", args.folder.join(manifest::NAME));
@@ -179,7 +182,8 @@ fn judge(args: &VerifyArgs, manifest: Result<Manifest>) -> Result<(Manifest, Sum
     Ok((manifest, summary))
 }
 
-/// Writes the results as JUnit XML and as a report, as far as they are asked for; returns the report's page.
+/// Writes the results as JUnit XML and as a report, as far as they are asked for; returns the
+/// report's page.
 fn write(args: &VerifyArgs, frames: &[Frame], summary: &Summary) -> Result<Option<PathBuf>> {
     if let Some(path) = &args.junit {
         junit::write(summary, &suite(args), path)?;
@@ -236,8 +240,9 @@ fn total(summary: &Summary) -> String {
     let parts: Vec<_> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
     let parts = if parts.is_empty() { "nothing to do".to_owned() } else { parts.join(", ") };
     let renders = plural(summary.frames.len(), "render", "renders");
-    match summary.device.is_empty() {
-        true => format!("{renders}: {parts} (no device was needed)"),
-        false => format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds),
+    if summary.device.is_empty() {
+        format!("{renders}: {parts} (no device was needed)")
+    } else {
+        format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds)
     }
 }

@@ -1,4 +1,5 @@
-//! `skylit --version`: the commit, the features that were compiled in, and the Vulkan devices of the machine.
+//! `skylit --version`: the commit, the features that were compiled in, and the Vulkan devices of
+//! the machine.
 
 use crate::error::Result;
 use crate::gpu::{DeviceInfo, Instance, enumerate};
@@ -8,7 +9,7 @@ fn short() -> String {
     format!("skylit {}", env!("CARGO_PKG_VERSION"))
 }
 
-/// What a bug report needs: `--version`.
+/// Returns the text of `--version`, which has all that a bug report needs.
 pub fn long() -> String {
     let lines = [("commit", env!("SKYLIT_BUILD_COMMIT").to_owned()), ("features", env!("SKYLIT_BUILD_FEATURES").to_owned())];
     let lines = lines.into_iter().chain(vulkan().into_iter().map(|line| ("vulkan", line)));

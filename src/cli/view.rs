@@ -92,8 +92,9 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
     }
 }
 
-/// Whether settings with defaults are as good as those `given`: they have an effect on what is looked at, and neither change the size of the window, which --size is
-/// here, nor put frames in real time in the place of an integrator.
+/// Whether settings with defaults are as good as those `given`: they have an effect on what is
+/// looked at, and neither change the size of the window, which --size is here, nor put frames in
+/// real time in the place of an integrator.
 fn is_shown(settings: &RenderSettings, given: &RenderSettings) -> bool {
     let is_frames = |s: &RenderSettings| s.realtime_setting().is_some();
     // an animation to start with, and its time, select no kind of image
@@ -109,16 +110,20 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let given = args.settings.over_file(args.settings_file.as_deref())?;
     given.camera.check()?;
     check_has_effect(&given)?;
+
+    // settings of the command line and of files
     let confine = args.load.options().confine;
     let files = args.config.files(args.scene.as_deref(), confine)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
     device_settings.check()?;
     config::report(args.verbosity.console(), &resolved.reports);
+
     if args.painter == Some(Painter::Vulkan) {
         // Mesa's CPU driver cannot rasterize with wider vectors; GPUs do not care
         crate::gpu::environment::prefer_vector_bits(256);
     }
+
     // without a device there is a window all the same: it says what is missing
     let device = crate::gpu::preferred(&device_settings.options()).ok();
     let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
@@ -135,10 +140,14 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         painter: args.painter.unwrap_or(if is_cpu { Painter::Cpu } else { Painter::Vulkan }),
         device_name: device.map(|d| d.name),
     };
+
+    // without a script the window is opened
     let Some(script) = &args.headless_script else {
         crate::terminal::interrupt::install();
         return Ok(window::run(&options)?);
     };
+
+    // a script prints its figures
     let console = args.verbosity.console();
     let sections = headless::run(&options, script)?;
     for section in &sections {

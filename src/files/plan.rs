@@ -1,6 +1,8 @@
-//! Which files a command reads and which it will write: no output takes the place of an input, or of another output. Folders that it makes for them go again if nothing comes.
+//! Which files a command reads and which it will write: no output takes the place of an input, or
+//! of another output. Folders that it makes for them go again if nothing comes.
 //!
-//! Files are compared by what they are, not by how they are spelled: `a.png` and `./a.png`, a link and what it points to, and two hard links to one file are the same.
+//! Files are compared by what they are, not by how they are spelled: `a.png` and `./a.png`, a link
+//! and what it points to, and two hard links to one file are the same.
 
 use std::collections::HashMap;
 use std::fs;
@@ -30,7 +32,8 @@ pub struct FilePlan {
     folders: Vec<Arc<NewFolder>>,
 }
 
-/// The folders of a path that were made for results, innermost first. Those that are still empty when it is dropped are removed.
+/// The folders of a path that were made for results, innermost first. Those that are still empty
+/// when it is dropped are removed.
 #[derive(Debug)]
 struct NewFolder(Vec<PathBuf>);
 
@@ -50,7 +53,7 @@ impl Drop for NewFolder {
     }
 }
 
-/// What a file is, however it is spelled.
+/// Identity of a file, however its path is spelled.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Identity {
     /// Device and number of a file that exists.
@@ -59,13 +62,14 @@ enum Identity {
     /// The path without links of a file that exists, where files have no numbers.
     #[cfg(not(unix))]
     Existing(PathBuf),
-    /// The path without links that a new file will have, in lower case: file systems that ignore case have one such file.
+    /// The path without links that a new file will have, in lower case: file systems that ignore
+    /// case have one such file.
     New(String),
 }
 
 impl Identity {
     /// `None` for a device, FIFO or socket, which is written to and not replaced.
-    fn of(path: &Path) -> Option<Self> {
+    fn from_path(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if !found.is_file() && !found.is_dir() => None,
             #[cfg(unix)]
@@ -85,12 +89,13 @@ impl Identity {
     }
 
     fn of_existing(path: &Path) -> Option<Self> {
-        Self::of(path).filter(|identity| !matches!(identity, Self::New(_)))
+        Self::from_path(path).filter(|identity| !matches!(identity, Self::New(_)))
     }
 }
 
 impl FilePlan {
-    /// Adds a file that is read; `role` says in a message what it is: `the scene`, `--baseline`. What does not exist does not count.
+    /// Adds a file that is read; `role` says in a message what it is: `the scene`, `--baseline`.
+    /// What does not exist does not count.
     pub fn reads(&mut self, role: &str, path: impl AsRef<Path>) {
         self.inputs.push((role.to_owned(), path.as_ref().to_owned()));
     }
@@ -98,9 +103,10 @@ impl FilePlan {
     /// Adds an image that is read, or all files of a folder of images.
     pub fn reads_images(&mut self, role: &str, path: impl AsRef<Path>) {
         let path = path.as_ref();
-        match path.is_dir() {
-            true => fs::read_dir(path).into_iter().flatten().flatten().for_each(|file| self.reads(role, file.path())),
-            false => self.reads(role, path),
+        if path.is_dir() {
+            fs::read_dir(path).into_iter().flatten().flatten().for_each(|file| self.reads(role, file.path()))
+        } else {
+            self.reads(role, path)
         }
     }
 
@@ -114,7 +120,8 @@ impl FilePlan {
         self.writes(option, folder.as_ref().join("index.html"));
     }
 
-    /// Makes a folder that results will be written into, where it is missing. It is taken away again with the plan's last copy, if nothing was written.
+    /// Makes a folder that results will be written into, where it is missing. It is taken away
+    /// again with the plan's last copy, if nothing was written.
     ///
     /// # Errors
     /// [`Error::Output`] when it cannot be made.
@@ -135,7 +142,7 @@ impl FilePlan {
     pub fn check(&self) -> Result<()> {
         let mut outputs: HashMap<Identity, (&str, &Path)> = HashMap::new();
         for (option, path) in &self.outputs {
-            let Some(identity) = Identity::of(path) else { continue };
+            let Some(identity) = Identity::from_path(path) else { continue };
             if let Some((other, same)) = outputs.insert(identity, (option, path)) {
                 let spelled = spelled(path, same);
                 let who = if other == option { format!("{option} is given twice") } else { format!("{other} and {option}") };

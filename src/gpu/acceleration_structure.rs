@@ -84,8 +84,8 @@ impl AccelerationStructure {
         Ok(Self { raw, address, buffer, device: device.clone() })
     }
 
-    /// Builds a bottom-level structure, and compacts it if that saves memory. On lavapipe it never does, but the query runs there too, so
-    /// that tests cover it.
+    /// Builds a bottom-level structure, and compacts it if that saves memory. On lavapipe it never
+    /// does, but the query runs there too, so that tests cover it.
     pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
         let (geometries, ranges) = bottom_level_geometry(input);
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
@@ -94,8 +94,8 @@ impl AccelerationStructure {
         inputs.build(device, commands, name)?.compacted(commands, name)
     }
 
-    /// As [`AccelerationStructure::bottom_level`], for inputs that will change: it can be updated, and is not compacted, so that a
-    /// rebuild fits.
+    /// As [`AccelerationStructure::bottom_level`], for inputs that will change: it can be updated,
+    /// and is not compacted, so that a rebuild fits.
     pub fn changing_bottom_level(
         device: &Arc<Device>,
         commands: &mut Commands,
@@ -105,8 +105,8 @@ impl AccelerationStructure {
         Inputs::changing(input).build(device, commands, name)
     }
 
-    /// Updates a structure made by [`AccelerationStructure::changing_bottom_level`]. Only the vertex positions of the input may
-    /// differ. The address stays valid.
+    /// Updates a structure made by [`AccelerationStructure::changing_bottom_level`]. Only the
+    /// vertex positions of the input may differ. The address stays valid.
     pub fn update(&self, commands: &mut Commands, input: &BottomLevelInput, update: Update) -> Result<()> {
         Inputs::changing(input).record(self, commands, update)
     }
@@ -135,10 +135,13 @@ impl AccelerationStructure {
 
     fn compacted(self, commands: &mut Commands, name: &str) -> Result<Self> {
         let functions = functions(&self.device)?.clone();
+
+        // the driver tells the compacted size on the device's side: a query
         let info = vk::QueryPoolCreateInfo::default()
             .query_type(vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR)
             .query_count(1);
-        // SAFETY: one query, reset, written by the submission below and read after it; the pool is destroyed here
+        // SAFETY: one query, reset, written by the submission below and read after it; the pool is
+        // destroyed here
         let size = unsafe {
             let pool = self.device.raw.create_query_pool(&info, None).context("the compaction query")?;
             self.device.raw.reset_query_pool(pool, 0, 1);
@@ -160,6 +163,8 @@ impl AccelerationStructure {
             read?;
             size[0]
         };
+
+        // a copy of nearly the same size is not worth its memory
         if size == 0 || size as f64 > (1.0 - MIN_COMPACTION_SAVING) * self.size() as f64 {
             return Ok(self);
         }
@@ -244,7 +249,7 @@ fn entry_records(device: &Arc<Device>, entries: &[AccelerationStructureInstance]
     Ok(records)
 }
 
-/// What a structure is built over, as Vulkan takes it.
+/// Inputs that a structure is built over, as Vulkan takes them.
 struct Inputs<'a> {
     ty: vk::AccelerationStructureTypeKHR,
     flags: vk::BuildAccelerationStructureFlagsKHR,
@@ -309,7 +314,8 @@ impl<'a> Inputs<'a> {
             Update::Rebuild => (vk::BuildAccelerationStructureModeKHR::BUILD, sizes.build_scratch_size),
             Update::Refit => (vk::BuildAccelerationStructureModeKHR::UPDATE, sizes.update_scratch_size),
         };
-        // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be aligned, so leave room for it
+        // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be
+        // aligned, so leave room for it
         let alignment = device.info.limits.scratch_alignment.max(1) as u64;
         let scratch = Buffer::new(device, "acceleration-structure scratch", size + alignment, Memory::Device)?;
         let mut info = self
@@ -321,8 +327,8 @@ impl<'a> Inputs<'a> {
         }
         commands.run(|r: &mut Recorder| {
             r.timed("build", |r| {
-                // SAFETY: inputs, target and scratch live until the submission is waited for; a refit's target was built
-                // with ALLOW_UPDATE over as many primitives
+                // SAFETY: inputs, target and scratch live until the submission is waited for; a
+                // refit's target was built with ALLOW_UPDATE over as many primitives
                 unsafe { functions.cmd_build_acceleration_structures(r.buffer, &[info], &[&self.ranges]) };
             })
         })?;

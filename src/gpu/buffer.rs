@@ -14,7 +14,8 @@ use crate::error::{Error, Result};
 /// How host and device access a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// Only the device accesses it; the host uploads through [`Buffer::fill`] and [`Buffer::write`].
+    /// Only the device accesses it; the host uploads through [`Buffer::fill`] and
+    /// [`Buffer::write`].
     Device,
     /// The host writes, the device reads.
     Upload,
@@ -58,6 +59,8 @@ impl Buffer {
                 device.info.limits.max_allocation >> 20
             )));
         }
+
+        // one usage for all buffers: passes may read, write and copy any of them
         let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
             | vk::BufferUsageFlags::INDIRECT_BUFFER
@@ -73,6 +76,7 @@ impl Buffer {
         let raw = unsafe { device.raw.create_buffer(&info, None) }.context(&what)?;
         device.name(raw, name);
         let mut buffer = Self { raw, allocation: None, size, address: 0, device: device.clone() };
+
         // SAFETY: the buffer is of this device
         let requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
         let location = match memory {
@@ -81,6 +85,8 @@ impl Buffer {
             Memory::Upload => MemoryLocation::CpuToGpu,
             Memory::Readback => MemoryLocation::GpuToCpu,
         };
+
+        // memory of its own, or a part of a larger block
         let allocation = device.allocate(
             &AllocationCreateDesc {
                 name,
@@ -95,6 +101,7 @@ impl Buffer {
         // SAFETY: fresh memory that fits the buffer's requirements
         unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }.context(&what)?;
         buffer.allocation = Some(allocation);
+
         // SAFETY: created with SHADER_DEVICE_ADDRESS, bound above
         buffer.address = unsafe { device.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(raw)) };
         Ok(buffer)
@@ -125,8 +132,8 @@ impl Buffer {
         self.size
     }
 
-    /// The contents, if mapped (always for [`Memory::Upload`] and [`Memory::Readback`]). The device is not using the buffer
-    /// meanwhile, because every submission is waited for.
+    /// The contents, if mapped (always for [`Memory::Upload`] and [`Memory::Readback`]). The device
+    /// is not using the buffer meanwhile, because every submission is waited for.
     pub fn bytes(&self) -> Option<&[u8]> {
         self.allocation.as_ref().and_then(|a| a.mapped_slice()).map(|s| &s[..self.size as usize])
     }
@@ -137,8 +144,9 @@ impl Buffer {
         self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).map(|s| &mut s[..size])
     }
 
-    /// Fills the first `size` bytes with records of `record` bytes: `write(index of the first record, bytes)` is called for consecutive
-    /// chunks, each a whole number of records. Mapped memory is one chunk, without a copy.
+    /// Fills the first `size` bytes with records of `record` bytes:
+    /// `write(index of the first record, bytes)` is called for consecutive chunks, each a whole
+    /// number of records. Mapped memory is one chunk, without a copy.
     pub fn fill(&mut self, size: u64, record: u64, mut write: impl FnMut(u64, &mut [u8])) -> Result<()> {
         debug_assert!(size <= self.size && size.is_multiple_of(record.max(1)));
         if size == 0 {
@@ -200,7 +208,8 @@ impl Buffer {
         Ok(out)
     }
 
-    /// As [`Buffer::read`], in chunks of whole records: `take(index of the first record, bytes)`. Mapped memory is not copied.
+    /// As [`Buffer::read`], in chunks of whole records: `take(index of the first record, bytes)`.
+    /// Mapped memory is not copied.
     pub fn read_with(&self, offset: u64, size: u64, record: u64, mut take: impl FnMut(u64, &[u8])) -> Result<()> {
         if size == 0 {
             return Ok(());
@@ -226,8 +235,8 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // before its memory is given back: else another thread's buffer has the same address while this one is still there
-        // SAFETY: submissions are waited for, so the device is not using it
+        // before its memory is given back: else another thread's buffer has the same address while
+        // this one is still there SAFETY: submissions are waited for, so the device is not using it
         unsafe { self.device.raw.destroy_buffer(self.raw, None) };
         if let Some(allocation) = self.allocation.take() {
             // a failed free can only leak

@@ -1,4 +1,5 @@
-//! The pipeline cache on disk: one file per device and driver version, replaced atomically, and ignored when it is another device's.
+//! The pipeline cache on disk: one file per device and driver version, replaced atomically, and
+//! ignored when it is another device's.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -9,7 +10,8 @@ use crate::files;
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
     files::cache_folder().map(|f| {
-        // Vulkan's device identity does not include a CPU driver's vector width; the subgroup size is that width over 32 bits
+        // Vulkan's device identity does not include a CPU driver's vector width; the subgroup size
+        // is that width over 32 bits
         let lanes = info.limits.subgroup_size;
         f.join(format!(
             "pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin",

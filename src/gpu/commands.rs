@@ -43,7 +43,8 @@ impl Commands {
         let pool_info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(device.queue_family)
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-        // SAFETY (all calls below): plain objects of the living device; on an early return Drop destroys null handles too
+        // SAFETY (all calls below): plain objects of the living device; on an early return Drop
+        // destroys null handles too
         let mut commands = Self {
             pool: unsafe { raw.create_command_pool(&pool_info, None) }.context("the command pool")?,
             buffer: vk::CommandBuffer::null(),
@@ -62,12 +63,12 @@ impl Commands {
         Ok(commands)
     }
 
-    /// Records with `record`, submits, waits until the device is done, and returns the timed regions in order. Writes of the
-    /// work are visible to the host and to later submissions.
+    /// Records with `record`, submits, waits until the device is done, and returns the timed
+    /// regions in order. Writes of the work are visible to the host and to later submissions.
     pub fn run(&mut self, record: impl FnOnce(&mut Recorder)) -> Result<Vec<Timing>> {
         let raw = &self.device.raw;
-        // SAFETY (all calls below): the buffer is not in use, because every submission was waited for; recording and
-        // submission follow the specification's order; the queue is locked
+        // SAFETY (all calls below): the buffer is not in use, because every submission was waited
+        // for; recording and submission follow the specification's order; the queue is locked
         unsafe {
             if let Some(queries) = self.queries.filter(|_| self.written > 0) {
                 raw.reset_query_pool(queries, 0, self.written);
@@ -141,7 +142,8 @@ pub struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// Times what `record` records. Regions do not nest; beyond the first few hundred of a submission they are not timed.
+    /// Times what `record` records. Regions do not nest; beyond the first few hundred of a
+    /// submission they are not timed.
     pub fn timed(&mut self, label: &'static str, record: impl FnOnce(&mut Self)) {
         let region = self.labels.len() as u32;
         let Some(queries) = self.queries.filter(|_| region < MAX_REGIONS) else { return record(self) };
@@ -161,8 +163,9 @@ impl Recorder<'_> {
         unsafe { device.raw.cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, 2 * region + 1) };
     }
 
-    /// A full memory barrier: commands recorded before it finish, and their writes are visible, before commands recorded after it
-    /// start. It costs microseconds, so passes use it rather than finer barriers.
+    /// A full memory barrier: commands recorded before it finish, and their writes are visible,
+    /// before commands recorded after it start. It costs microseconds, so passes use it rather than
+    /// finer barriers.
     pub fn barrier(&mut self) {
         let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
         self.memory_barrier(
@@ -208,8 +211,8 @@ impl Recorder<'_> {
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 
-    /// Writes a value to the beginning of a buffer when the device executes this command (vkCmdUpdateBuffer). Its size must be a
-    /// multiple of 4, up to 64 KiB.
+    /// Writes a value to the beginning of a buffer when the device executes this command
+    /// (vkCmdUpdateBuffer). Its size must be a multiple of 4, up to 64 KiB.
     pub fn update<T: bytemuck::NoUninit>(&mut self, buffer: &Buffer, value: &T) {
         let bytes = bytemuck::bytes_of(value);
         assert!(bytes.len().is_multiple_of(4) && bytes.len() <= 1 << 16 && bytes.len() as u64 <= buffer.size());
@@ -229,8 +232,8 @@ impl Recorder<'_> {
         unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, size, word) };
     }
 
-    /// Dispatches a compute pipeline over `groups` work-groups. The addresses in `push` must be those of live buffers with the layout
-    /// that the shader expects.
+    /// Dispatches a compute pipeline over `groups` work-groups. The addresses in `push` must be
+    /// those of live buffers with the layout that the shader expects.
     pub fn dispatch<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, groups: u32) {
         self.dispatch_3d(pipeline, push, [groups, 1, 1]);
     }
@@ -238,7 +241,8 @@ impl Recorder<'_> {
     /// As [`Recorder::dispatch`], over work-groups along x, y and z.
     pub fn dispatch_3d<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, [x, y, z]: [u32; 3]) {
         assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MAX_WORKGROUPS);
-        // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
+        // SAFETY: recording state; the push constants have the size that the layout was made with
+        // (asserted there)
         unsafe {
             self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             self.push(pipeline.layout(), vk::ShaderStageFlags::COMPUTE, push);
@@ -246,8 +250,9 @@ impl Recorder<'_> {
         }
     }
 
-    /// As [`Recorder::dispatch`], over as many work-groups along x, y and z as the three words say that lie at `offset`, a multiple of 4, when the device executes
-    /// this command. What writes them keeps to the device's limits.
+    /// As [`Recorder::dispatch`], over as many work-groups along x, y and z as the three words say
+    /// that lie at `offset`, a multiple of 4, when the device executes this command. What writes
+    /// them keeps to the device's limits.
     pub fn dispatch_indirect<P: bytemuck::NoUninit>(
         &mut self,
         pipeline: &ComputePipeline,
@@ -264,7 +269,8 @@ impl Recorder<'_> {
         }
     }
 
-    /// Traces with a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
+    /// Traces with a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for
+    /// `push`.
     pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
         let (Some(functions), Some(table)) = (&self.device.pipelines, pipeline.table()) else { return };
         // SAFETY: as above; the tables were made for this pipeline

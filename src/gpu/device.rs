@@ -15,7 +15,8 @@ use super::pipeline::LivePipelines;
 use super::result::Context;
 use crate::error::{Error, Result};
 
-/// Memory that is taken from the driver at a time, bytes; larger buffers get an allocation of their own, so small blocks waste little.
+/// Memory that is taken from the driver at a time, bytes; larger buffers get an allocation of their
+/// own, so small blocks waste little.
 const BLOCK: u64 = 16 << 20;
 
 /// Options to open a device with.
@@ -27,8 +28,9 @@ pub struct Options {
     pub validation: bool,
     /// Use 32-bit loads even if shaderInt64 is available, to test them.
     pub no_int64: bool,
-    /// Number of recently compiled pipelines that are kept though unused: for processes that render many scenes with one device,
-    /// which is then never closed. A CPU driver's pipelines take megabytes each.
+    /// Number of recently compiled pipelines that are kept though unused: for processes that render
+    /// many scenes with one device, which is then never closed. A CPU driver's pipelines take
+    /// megabytes each.
     pub keep_pipelines: usize,
 }
 
@@ -58,7 +60,8 @@ impl Device {
     /// Opens the device that `options` name, or the most capable one.
     ///
     /// # Errors
-    /// [`Error::Device`] when there is no device, none matches, or it lacks a required feature; the message names it.
+    /// [`Error::Device`] when there is no device, none matches, or it lacks a required feature; the
+    /// message names it.
     pub fn open(options: &Options) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
         let mut info = pick(enumerate(&instance)?, options.device.as_deref())?;
@@ -67,6 +70,8 @@ impl Device {
 
         let pipeline = info.has_ray_tracing_pipelines();
         let query = info.has_ray_queries();
+
+        // features that the renderer needs, and those of the tracers that the device can run
         let mut extensions = Vec::new();
         let mut f12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true).host_query_reset(true);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -85,6 +90,8 @@ impl Device {
             .enabled_features(&features)
             .push_next(&mut f12)
             .push_next(&mut f13);
+
+        // each tracer's extensions are enabled if they are there
         if pipeline || query {
             extensions.extend([khr::acceleration_structure::NAME.as_ptr(), khr::deferred_host_operations::NAME.as_ptr()]);
             create = create.push_next(&mut f_structure);
@@ -98,10 +105,14 @@ impl Device {
             create = create.push_next(&mut f_query);
         }
         create = create.enabled_extension_names(&extensions);
-        // SAFETY: the physical device is of this instance; everything enabled was reported as supported
+
+        // SAFETY: the physical device is of this instance; everything enabled was reported as
+        // supported
         let raw = unsafe { instance.raw.create_device(info.physical, &create, None) }.context("opening the Vulkan device")?;
         // SAFETY: the device was created with one queue of this family
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
+
+        // memory, and pipelines that were compiled before
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: raw.clone(),
@@ -133,14 +144,16 @@ impl Device {
     }
 
     pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
-        // a poisoned lock means that a thread panicked within the allocator; there is nothing better to do than go on
+        // a poisoned lock means that a thread panicked within the allocator; there is nothing
+        // better to do than go on
         self.allocator.lock().unwrap_or_else(|e| e.into_inner())
     }
 
     /// Allocates memory. `what` it is for, and what helps where none is left, are put into errors.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], and [`Error::Output`] where the driver keeps memory in a file that would exceed the limit for files.
+    /// [`Error::OutOfMemory`], and [`Error::Output`] where the driver keeps memory in a file that
+    /// would exceed the limit for files.
     pub(super) fn allocate(&self, request: &AllocationCreateDesc, what: &str, remedy: &str) -> Result<Allocation> {
         let mut allocator = self.allocator();
         let size = request.requirements.size;
@@ -234,7 +247,8 @@ fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every object of the device holds an Arc of it, so all are gone; the allocator goes before the device
+        // SAFETY: every object of the device holds an Arc of it, so all are gone; the allocator
+        // goes before the device
         unsafe {
             let _ = self.raw.device_wait_idle();
             self.raw.destroy_pipeline_cache(self.pipeline_cache, None);

@@ -14,8 +14,9 @@ use super::image::{Image, Targets, range};
 const MAX_VIEWPORT_FACTOR: f32 = 8.0;
 
 impl Device {
-    /// Size of the viewport relative to an image of `size` pixels, with which it shares its centre: clip space extends beyond the image by
-    /// this factor. CPU drivers clip at the viewport, having no guard band, and are slow at it: a larger viewport avoids that.
+    /// Size of the viewport relative to an image of `size` pixels, with which it shares its centre:
+    /// clip space extends beyond the image by this factor. CPU drivers clip at the viewport, having
+    /// no guard band, and are slow at it: a larger viewport avoids that.
     pub fn viewport_factor(&self, size: [u32; 2]) -> f32 {
         let limits = &self.info.limits;
         let most = size.map(|n| {
@@ -34,10 +35,13 @@ pub struct DrawRecorder<'r, 'd> {
 }
 
 impl<'d> Recorder<'d> {
-    /// Clears the upper left `size` pixels of the targets to zero and draws there. Clip space is [`Device::viewport_factor`] times as large
-    /// as the image. The previous contents of the targets are discarded.
+    /// Clears the upper left `size` pixels of the targets to zero and draws there. Clip space is
+    /// [`Device::viewport_factor`] times as large as the image. The previous contents of the
+    /// targets are discarded.
     pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut DrawRecorder<'_, 'd>)) {
         assert!(size[0] <= targets.size()[0] && size[1] <= targets.size()[1]);
+
+        // contents of the frame before are dropped
         self.transition(
             &targets.ids,
             vk::ImageAspectFlags::COLOR,
@@ -48,6 +52,8 @@ impl<'d> Recorder<'d> {
             vk::ImageAspectFlags::DEPTH,
             [vk::ImageLayout::UNDEFINED, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL],
         );
+
+        // both targets are cleared: no primitive, and the furthest depth, which is 0
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: size[0], height: size[1] } };
         let ids = [vk::RenderingAttachmentInfo::default()
             .image_view(targets.ids.view)
@@ -63,10 +69,14 @@ impl<'d> Recorder<'d> {
             .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } });
         let info =
             vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&ids).depth_attachment(&depth);
+
+        // a viewport that is larger than the device allows is scaled about its middle
         let factor = self.device.viewport_factor(size);
         let [width, height] = size.map(|n| factor * n as f32);
         let [x, y] = size.map(|n| 0.5 * n as f32 * (1.0 - factor));
         let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
+
+        // the caller records its draws between begin and end
         let (raw, buffer) = (&self.device.raw, self.buffer);
         // SAFETY: recording state; the targets are in the layouts that are named here
         unsafe {
@@ -80,7 +90,8 @@ impl<'d> Recorder<'d> {
         unsafe { self.device.raw.cmd_end_rendering(self.buffer) };
     }
 
-    /// Copies the ids of the upper left `size` pixels to a buffer: two words per pixel, rows without padding.
+    /// Copies the ids of the upper left `size` pixels to a buffer: two words per pixel, rows
+    /// without padding.
     pub fn copy_ids(&mut self, targets: &Targets, size: [u32; 2], to: &Buffer) {
         assert!(8 * size[0] as u64 * size[1] as u64 <= to.size());
         self.transition(
@@ -131,15 +142,16 @@ impl DrawRecorder<'_, '_> {
         self.bound = Some(pipeline.layout);
     }
 
-    /// Sets the push constants of the next draws. The addresses in `push` must be those of live buffers with the layout that the shaders
-    /// expect. To be called after [`DrawRecorder::bind`].
+    /// Sets the push constants of the next draws. The addresses in `push` must be those of live
+    /// buffers with the layout that the shaders expect. To be called after [`DrawRecorder::bind`].
     pub fn push<P: bytemuck::NoUninit>(&mut self, push: &P) {
         if let Some(layout) = self.bound {
             self.recorder.push(layout, DRAW_STAGES, push);
         }
     }
 
-    /// Draws triangles from consecutive vertices, once per instance. To be called after [`DrawRecorder::push`].
+    /// Draws triangles from consecutive vertices, once per instance. To be called after
+    /// [`DrawRecorder::push`].
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) {
         if self.bound.is_none() || vertices.is_empty() || instances.is_empty() {
             return;

@@ -1,11 +1,14 @@
 //! Environment variables of CPU drivers, set right before the Vulkan loader loads a driver.
 //!
-//! Mesa's lavapipe uses vectors of 256 bits unless `LP_NATIVE_VECTOR_WIDTH` sets another width. With 512, where the CPU supports it, the compute tracer is a quarter to
-//! two fifths faster (docs/traversal.md). So the first device that a process opens, in skylit itself, in a test or in another program that uses this crate, sets
-//! the CPU's widest vectors, unless the user has set a width.
+//! Mesa's lavapipe uses vectors of 256 bits unless `LP_NATIVE_VECTOR_WIDTH` sets another width.
+//! With 512, where the CPU supports it, the compute tracer is a quarter to two fifths faster
+//! (docs/traversal.md). So the first device that a process opens, in skylit itself, in a test or in
+//! another program that uses this crate, sets the CPU's widest vectors, unless the user has set a
+//! width.
 //!
-//! Mesa's shader cache does not distinguish widths, and code for one width gives wrong results with another. So a width other than the driver's default
-//! has its own cache folder, and the file names of the pipeline cache contain the width (`cache.rs`).
+//! Mesa's shader cache does not distinguish widths, and code for one width gives wrong results with
+//! another. So a width other than the driver's default has its own cache folder, and the file names
+//! of the pipeline cache contain the width (`cache.rs`).
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -21,41 +24,53 @@ const NO_CACHE: &str = "MESA_SHADER_CACHE_DISABLE";
 const WORKERS: &str = "LP_NUM_THREADS";
 const BASE: &str = "XDG_CACHE_HOME";
 
-/// Variables of Mesa's developers that are switches: with them nothing is rasterized, or the driver crashes.
+/// Variables of Mesa's developers that are switches: with them nothing is rasterized, or the driver
+/// crashes.
 const SWITCHES: [&str; 2] = ["LP_NO_RAST", "GALLIUM_NOOP"];
-/// The variable of Mesa's developers that, switched off, has vertices processed by an interpreter, which Vulkan drivers have not.
+/// The variable of Mesa's developers that, switched off, has vertices processed by an interpreter,
+/// which Vulkan drivers have not.
 const INTERPRETER: &str = "DRAW_USE_LLVM";
-/// The variable of Mesa's developers that names parts of rasterization to leave out, such as `no_depth`.
+/// The variable of Mesa's developers that names parts of rasterization to leave out, such as
+/// `no_depth`.
 const LEFT_OUT: &str = "LP_PERF";
 /// Values of switches that are off, as Mesa reads them.
 const OFF: [&str; 7] = ["0", "n", "no", "f", "F", "false", "FALSE"];
 
-/// Widths of vectors for which lavapipe computes what it should: with others it crashes, or half of the pixels are wrong.
+/// Widths of vectors for which lavapipe computes what it should: with others it crashes, or half of
+/// the pixels are wrong.
 const WIDTHS: [&str; 3] = ["128", "256", "512"];
 
 /// Preferred vector width in bits; 0 for the CPU's widest.
 static PREFERRED: AtomicU32 = AtomicU32::new(0);
 
-/// Sets the vector width of lavapipe in this process: 128, 256 or 512 bits in place of the CPU's widest. Mesa can rasterize with at most 256. It has no
-/// effect if the user has set `LP_NATIVE_VECTOR_WIDTH`, nor after a device has been opened or listed: a driver keeps the width with which it was loaded.
+/// Sets the vector width of lavapipe in this process: 128, 256 or 512 bits in place of the CPU's
+/// widest. Mesa can rasterize with at most 256. It has no effect if the user has set
+/// `LP_NATIVE_VECTOR_WIDTH`, nor after a device has been opened or listed: a driver keeps the width
+/// with which it was loaded.
 pub fn prefer_vector_bits(bits: u32) {
     PREFERRED.store(bits, Ordering::Relaxed);
 }
 
-/// Checks the variables, and sets those that are missing once per process. To be called before the Vulkan loader is opened.
+/// Checks the variables, and sets those that are missing once per process. To be called before the
+/// Vulkan loader is opened.
 ///
-/// std locks the environment for reads and writes by Rust code, but not for `getenv` in C code on another thread. A program that has such threads must open
-/// its first device before they start, or set these variables itself; then nothing is changed here.
+/// std locks the environment for reads and writes by Rust code, but not for `getenv` in C code on
+/// another thread. A program that has such threads must open its first device before they start, or
+/// set these variables itself; then nothing is changed here.
 ///
 /// # Errors
-/// [`Error::Device`] for a variable that would make the driver crash or compute what is wrong, [`Error::OutOfMemory`] if there is no room for a driver's threads.
+/// [`Error::Device`] for a variable that would make the driver crash or compute what is wrong,
+/// [`Error::OutOfMemory`] if there is no room for a driver's threads.
 pub(super) fn prepare() -> Result<()> {
     check(&|name| std::env::var_os(name).filter(|value| !value.is_empty()))?;
     let requested = || requested_workers(std::env::var_os(WORKERS));
     let workers = threads::driver_workers(requested()).ok_or_else(no_room)?;
+
+    // variables are set once, before any driver is loaded
     static PREPARED: Once = Once::new();
     PREPARED.call_once(|| {
-        // a driver that another part of the process has loaded keeps its width, and must keep its cache
+        // a driver that another part of the process has loaded keeps its width, and must keep its
+        // cache
         if is_loaded() {
             return;
         }
@@ -81,11 +96,13 @@ pub(super) fn prepare() -> Result<()> {
                     (name, value) = (NO_CACHE, "true".into());
                 }
             }
-            // SAFETY: std's lock excludes other Rust code, no driver that could read the environment is loaded yet, and `prepare` documents what programs with
-            // C threads must do
+            // SAFETY: std's lock excludes other Rust code, no driver that could read the
+            // environment is loaded yet, and `prepare` documents what programs with C threads must
+            // do
             unsafe { std::env::set_var(name, value) };
         }
     });
+
     // one that was loaded before starts as many threads as it did then
     if workers < threads::workers(requested()) { Err(no_room()) } else { Ok(()) }
 }
@@ -97,7 +114,8 @@ fn no_room() -> Error {
     )
 }
 
-/// Refuses values with which a driver of the CPU crashes or computes what is wrong. `variable` has those that are set.
+/// Refuses values with which a driver of the CPU crashes or computes what is wrong. `variable` has
+/// those that are set.
 fn check(variable: &dyn Fn(&str) -> Option<OsString>) -> Result<()> {
     let refuse = |name: &str, value: &OsStr, why: &str| {
         Err(Error::Device(format!("{name}={} {why}", value.to_string_lossy().replace(char::is_control, " "))))
@@ -124,7 +142,8 @@ fn check(variable: &dyn Fn(&str) -> Option<OsString>) -> Result<()> {
     }
 }
 
-/// The number of workers that the user asks for, as Mesa reads it; `None` for one for each processor.
+/// The number of workers that the user asks for, as Mesa reads it; `None` for one for each
+/// processor.
 fn requested_workers(text: Option<OsString>) -> Option<usize> {
     let text = text?.into_string().ok()?;
     let number: i64 = text.trim().parse().ok()?;
@@ -132,8 +151,9 @@ fn requested_workers(text: Option<OsString>) -> Option<usize> {
     Some(usize::try_from(number).unwrap_or(usize::MAX))
 }
 
-/// What to set where the driver keeps its default width. `cache`: the folder that the user has chosen for its cache; `base`: the folder of caches; `is_lost`: the driver would take
-/// another one, relative to the current folder.
+/// Returns the variable to set where the driver keeps its default width. `cache`: the folder that
+/// the user has chosen for its cache; `base`: the folder of caches; `is_lost`: the driver would
+/// take another one, relative to the current folder.
 fn default_cache(cache: Option<OsString>, base: Option<&Path>, is_lost: bool) -> Option<(&'static str, OsString)> {
     let none = Some((NO_CACHE, "true".into()));
     match (cache, base) {
@@ -156,7 +176,8 @@ fn default_cache(cache: Option<OsString>, base: Option<&Path>, is_lost: bool) ->
     }
 }
 
-/// Whether Mesa can write its shader cache below a folder: it would print a line otherwise, for either of the two folders that its versions use.
+/// Whether Mesa can write its shader cache below a folder: it would print a line otherwise, for
+/// either of the two folders that its versions use.
 fn can_hold_default_cache(base: &Path) -> bool {
     let is_writable = |name: &str| {
         let folder = base.join(name);
@@ -173,7 +194,8 @@ fn preferred_bits() -> Option<u32> {
     }
 }
 
-/// The variables to set. `width`, `cache`: current values of the two variables; `preferred`: the width if the user has set none; `folder`: skylit's cache folder.
+/// The variables to set. `width`, `cache`: current values of the two variables; `preferred`: the
+/// width if the user has set none; `folder`: skylit's cache folder.
 fn changes(
     width: Option<OsString>,
     cache: Option<OsString>,
@@ -201,7 +223,8 @@ fn is_loaded() -> bool {
     std::fs::read_to_string("/proc/self/maps").is_ok_and(|maps| maps.contains("libvulkan_lvp"))
 }
 
-/// The limit of this process for the size of files (`ulimit -f`), bytes; `None` without one. Lavapipe keeps device memory in a file without a name, and crashes where that cannot grow.
+/// The limit of this process for the size of files (`ulimit -f`), bytes; `None` without one.
+/// Lavapipe keeps device memory in a file without a name, and crashes where that cannot grow.
 pub(super) fn file_size_limit() -> Option<u64> {
     static LIMIT: OnceLock<Option<u64>> = OnceLock::new();
     *LIMIT.get_or_init(|| file_size_limit_in(&std::fs::read_to_string("/proc/self/limits").ok()?))
@@ -234,14 +257,14 @@ mod tests {
 
     #[test]
     fn the_limit_for_files_is_read() {
-        let of = |limit: &str| {
+        let read_limit = |limit: &str| {
             let head = "Limit                     Soft Limit           Hard Limit           Units\nMax cpu time              5                    unlimited            seconds\n";
             file_size_limit_in(&format!("{head}Max file size             {limit}                 unlimited            bytes\n"))
         };
-        assert_eq!((of("8192"), of("unlimited"), file_size_limit_in("")), (Some(8192), None, None));
+        assert_eq!((read_limit("8192"), read_limit("unlimited"), file_size_limit_in("")), (Some(8192), None, None));
     }
 
-    fn of(width: Option<&str>, cache: Option<&str>, preferred: Option<u32>) -> Vec<(&'static str, String)> {
+    fn changes_as_text(width: Option<&str>, cache: Option<&str>, preferred: Option<u32>) -> Vec<(&'static str, String)> {
         let all = changes(width.map(Into::into), cache.map(Into::into), preferred, Some("/home/.cache/skylit".into()));
         all.into_iter().map(|(name, value)| (name, value.into_string().unwrap())).collect()
     }
@@ -249,14 +272,14 @@ mod tests {
     #[test]
     fn each_width_has_a_cache_of_its_own() {
         let cache = |path: &str| (CACHE, path.to_owned());
-        assert_eq!(of(None, None, Some(512)), [cache("/home/.cache/skylit/mesa-512"), (WIDTH, "512".to_owned())]);
-        assert_eq!(of(None, Some("/c"), Some(256)), [cache("/c/mesa-256"), (WIDTH, "256".to_owned())]);
+        assert_eq!(changes_as_text(None, None, Some(512)), [cache("/home/.cache/skylit/mesa-512"), (WIDTH, "512".to_owned())]);
+        assert_eq!(changes_as_text(None, Some("/c"), Some(256)), [cache("/c/mesa-256"), (WIDTH, "256".to_owned())]);
         // the driver's own choice
-        assert_eq!(of(None, Some("/c"), None), []);
+        assert_eq!(changes_as_text(None, Some("/c"), None), []);
         // what the user has set stays
-        assert_eq!(of(Some("128"), None, Some(512)), [cache("/home/.cache/skylit/mesa-128")]);
+        assert_eq!(changes_as_text(Some("128"), None, Some(512)), [cache("/home/.cache/skylit/mesa-128")]);
         // a program that one of us has started changes nothing
-        assert_eq!(of(Some("512"), Some("/c/mesa-512"), Some(512)), []);
+        assert_eq!(changes_as_text(Some("512"), Some("/c/mesa-512"), Some(512)), []);
         assert!(changes(None, None, Some(512), None).is_empty());
     }
 
@@ -295,9 +318,9 @@ mod tests {
 
     #[test]
     fn workers_are_read_as_mesa_does() {
-        let of = |text: &str| requested_workers(Some(text.into()));
+        let read_workers = |text: &str| requested_workers(Some(text.into()));
         assert_eq!(
-            [of("3"), of("0"), of("-1"), of("many"), requested_workers(None)],
+            [read_workers("3"), read_workers("0"), read_workers("-1"), read_workers("many"), requested_workers(None)],
             [Some(3), Some(0), Some(usize::MAX), None, None]
         );
     }

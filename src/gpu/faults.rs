@@ -1,4 +1,5 @@
-//! Faults on demand, for tests (feature `probes`): a device that is lost, memory that runs out, a driver without a feature. Environment variables ask for them:
+//! Faults on demand, for tests (feature `probes`): a device that is lost, memory that runs out, a
+//! driver without a feature. Environment variables ask for them:
 //!
 //! | variable | what happens |
 //! |---|---|
@@ -22,11 +23,11 @@ fn variable(name: &str) -> Option<String> {
 
 /// When a device is lost.
 enum Loss {
-    /// At the submission of this number.
+    /// The device is lost at the submission of this number.
     At(u64),
-    /// At that one and at all later ones.
+    /// The device is lost at that one and at all later ones.
     From(u64),
-    /// Once, when this file exists.
+    /// The device is lost once, when this file exists.
     When(PathBuf),
 }
 

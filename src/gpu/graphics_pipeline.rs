@@ -1,4 +1,5 @@
-//! Graphics pipelines that draw triangles into [`super::Targets`]. Vertices are fetched by address: there are no vertex buffers.
+//! Graphics pipelines that draw triangles into [`super::Targets`]. Vertices are fetched by address:
+//! there are no vertex buffers.
 
 use std::sync::Arc;
 
@@ -32,8 +33,8 @@ pub struct GraphicsPipeline {
 }
 
 impl GraphicsPipeline {
-    /// Compiles two shaders with entry point `main` and the same specialization. The depth test passes for greater values
-    /// (reversed depth).
+    /// Compiles two shaders with entry point `main` and the same specialization. The depth test
+    /// passes for greater values (reversed depth).
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -46,6 +47,8 @@ impl GraphicsPipeline {
         let module = |shader| Module::new(device, name, shader, specialization);
         let modules = [module(vertex)?, module(fragment)?];
         let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
+
+        // no vertex buffers: shaders read the scene's records themselves
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
@@ -58,15 +61,21 @@ impl GraphicsPipeline {
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .line_width(1.0);
         let multisample = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+
+        // depth is reversed: nearer is greater
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(true)
             .depth_write_enable(true)
             .depth_compare_op(vk::CompareOp::GREATER);
+
+        // IDs have two channels
         let both = vk::ColorComponentFlags::R | vk::ColorComponentFlags::G;
         let attachments = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(both)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
+
+        // dynamic rendering: the formats stand in for a render pass
         let formats = [IDS];
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats).depth_attachment_format(DEPTH);

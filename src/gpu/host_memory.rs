@@ -1,4 +1,5 @@
-//! What happens when the host's memory runs out: one line and the exit code of [`Error::OutOfMemory`], where Rust's own allocator would abort.
+//! End of the program when the host's memory runs out: one line and the exit code of
+//! [`Error::OutOfMemory`], where Rust's own allocator would abort.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Write;
@@ -6,12 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
 
-/// The system's allocator for programs that are to end with a line when it has nothing left. `src/main.rs` declares it as the global allocator of `skylit`.
+/// The system's allocator for programs that are to end with a line when it has nothing left.
+/// `src/main.rs` declares it as the global allocator of `skylit`.
 ///
-/// Files are written without a name until they are complete ([`crate::files`]), so ending at once leaves none behind.
+/// Files are written without a name until they are complete ([`crate::files`]), so ending at once
+/// leaves none behind.
 pub struct HostAllocator;
 
-// SAFETY: every call goes to the system's allocator unchanged; what it returns is returned unless it is null, which ends the process
+// SAFETY: every call goes to the system's allocator unchanged; what it returns is returned unless
+// it is null, which ends the process
 unsafe impl GlobalAlloc for HostAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promises are those of the system's allocator
@@ -39,16 +43,18 @@ fn checked(memory: *mut u8, size: usize) -> *mut u8 {
 }
 
 unsafe extern "C" {
-    /// Ends the process at once (C99; `_exit` of POSIX): without destructors of C++ libraries, which other threads still use.
+    /// Ends the process at once (C99; `_exit` of POSIX): without destructors of C++ libraries,
+    /// which other threads still use.
     #[link_name = "_Exit"]
     safe fn exit_at_once(code: i32) -> !;
 }
 
-/// What threads and the C library take at the start of the program, in bytes, and more.
+/// Bytes that threads and the C library take at the start of the program, and more.
 const ROOM_TO_START: usize = 16 << 20;
 
-/// Ends the process with the line and the exit code of [`Error::OutOfMemory`] if there is no room for threads: where the C library has nothing left for what it keeps of each,
-/// it aborts. To be called before any thread is started.
+/// Ends the process with the line and the exit code of [`Error::OutOfMemory`] if there is no room
+/// for threads: where the C library has nothing left for what it keeps of each, it aborts. To be
+/// called before any thread is started.
 pub fn check_room_to_start() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(ROOM_TO_START)));
 }

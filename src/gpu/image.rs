@@ -43,6 +43,7 @@ impl Image {
         let raw = unsafe { device.raw.create_image(&info, None) }.context(name)?;
         device.name(raw, name);
         let mut image = Self { raw, view: vk::ImageView::null(), allocation: None, size, device: device.clone() };
+
         // SAFETY: the image is of this device
         let requirements = unsafe { device.raw.get_image_memory_requirements(raw) };
         let mib = requirements.size.div_ceil(1 << 20);
@@ -60,6 +61,8 @@ impl Image {
         // SAFETY: fresh memory that fits the image's requirements
         unsafe { device.raw.bind_image_memory(raw, allocation.memory(), allocation.offset()) }.context(name)?;
         image.allocation = Some(allocation);
+
+        // a view of all of it
         let info = vk::ImageViewCreateInfo::default()
             .image(raw)
             .view_type(vk::ImageViewType::TYPE_2D)
@@ -95,7 +98,8 @@ pub(super) fn range(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange { aspect_mask: aspect, base_mip_level: 0, level_count: 1, base_array_layer: 0, layer_count: 1 }
 }
 
-/// Render targets of the visibility pass: two unsigned integers per pixel, and reversed depth (greater is nearer).
+/// Render targets of the visibility pass: two unsigned integers per pixel, and reversed depth
+/// (greater is nearer).
 pub struct Targets {
     pub(super) ids: Image,
     pub(super) depth: Image,
@@ -105,7 +109,8 @@ impl Targets {
     /// Allocates both.
     ///
     /// # Errors
-    /// [`Error::Device`] when the device cannot rasterize, or not into images of that size; [`Error::OutOfMemory`].
+    /// [`Error::Device`] when the device cannot rasterize, or not into images of that size;
+    /// [`Error::OutOfMemory`].
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         let info = &device.info;
         if !info.can_rasterise() {

@@ -17,7 +17,8 @@ pub struct Limits {
     pub subgroup_size: u32,
     /// Compute shaders support subgroup ballots.
     pub subgroup_ballot: bool,
-    /// The packet kernel can run: compute shaders support ballots, subgroup arithmetic and full subgroups of 8 to 64 lanes.
+    /// The packet kernel can run: compute shaders support ballots, subgroup arithmetic and full
+    /// subgroups of 8 to 64 lanes.
     pub packets: bool,
     /// Maximum number of work-groups along x in a dispatch.
     pub max_workgroups_x: u32,
@@ -122,7 +123,8 @@ impl DeviceInfo {
         self.missing_floor.is_empty() && self.missing_raster.is_empty()
     }
 
-    /// Whether the driver leaves any loop in a shader after 65,535 iterations, as Mesa's CPU driver did before version 23.
+    /// Whether the driver leaves any loop in a shader after 65,535 iterations, as Mesa's CPU driver
+    /// did before version 23.
     pub fn cuts_long_loops(&self) -> bool {
         let major = self.driver.split("Mesa ").nth(1).and_then(|v| v.split('.').next()).and_then(|v| v.parse::<u32>().ok());
         self.is_cpu() && major.is_some_and(|m| m < 23)
@@ -155,10 +157,12 @@ fn text(s: &[std::ffi::c_char]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6 and 25.0.7).
+/// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6
+/// and 25.0.7).
 const MAX_RASTER_BITS: u32 = 256;
 
-/// Vector width of Mesa's CPU driver in bits, from its device name: "llvmpipe (LLVM 15.0.6, 256 bits)".
+/// Vector width of Mesa's CPU driver in bits, from its device name: "llvmpipe (LLVM 15.0.6, 256
+/// bits)".
 fn vector_bits(name: &str) -> Option<u32> {
     name.strip_prefix("llvmpipe")?.strip_suffix(" bits)")?.rsplit(' ').next()?.parse().ok()
 }
@@ -191,6 +195,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)) && !name.to_str().is_ok_and(faults::lacks)
     };
 
+    // properties of the driver and of the extensions that it has
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut structure = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
@@ -205,6 +210,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     unsafe { raw.get_physical_device_properties2(physical, &mut properties2) };
     let properties = properties2.properties;
 
+    // features, of which structures may be chained only if the driver knows them
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
     let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
@@ -233,6 +239,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let graphics_family = family(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS);
     let queue_family = graphics_family.or_else(|| family(vk::QueueFlags::COMPUTE));
 
+    // features without which skylit cannot use the device
     let mut missing_floor = Vec::new();
     if !vulkan13 || faults::lacks("Vulkan 1.3") {
         missing_floor.push("Vulkan 1.3".to_owned());
@@ -252,6 +259,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         missing_floor.push("a compute queue".to_owned());
     }
 
+    // features without which it cannot rasterize
     let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_RASTER_BITS);
     let missing_raster = [
         (graphics_family.is_some(), "a queue for graphics and compute"),
@@ -265,6 +273,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     ];
     let missing_raster = missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect();
 
+    // extensions for ray tracing, which are options
     let ray_tracing = RayTracingExtensions {
         acceleration_structure: f_structure.acceleration_structure == vk::TRUE,
         deferred_host_operations: has(khr::deferred_host_operations::NAME),
@@ -272,6 +281,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         ray_query: f_query.ray_query == vk::TRUE,
     };
 
+    // limits and names
     let memory = unsafe { raw.get_physical_device_memory_properties(physical) };
     let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
     let device_memory = heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum();

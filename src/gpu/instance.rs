@@ -38,18 +38,22 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// Loads Vulkan. With `validation`, every message of VK_LAYER_KHRONOS_validation is kept and can fail the run.
+    /// Loads Vulkan. With `validation`, every message of VK_LAYER_KHRONOS_validation is kept and
+    /// can fail the run.
     ///
-    /// The first instance of a process sets environment variables that Mesa's CPU driver reads ([`super::environment`]): a program with threads in which C code
-    /// reads the environment must create it before they start.
+    /// The first instance of a process sets environment variables that Mesa's CPU driver reads
+    /// ([`super::environment`]): a program with threads in which C code reads the environment must
+    /// create it before they start.
     ///
     /// # Errors
-    /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the requested validation layer.
+    /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the
+    /// requested validation layer.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
         Self::with_extensions(validation, &[])
     }
 
-    /// As [`Instance::new`], with extensions, which the loader must have: names that end with NUL and live forever.
+    /// As [`Instance::new`], with extensions, which the loader must have: names that end with NUL
+    /// and live forever.
     ///
     /// # Errors
     /// As [`Instance::new`].
@@ -58,12 +62,15 @@ impl Instance {
         if let Some(error) = super::manifests::deadly() {
             return Err(error);
         }
+
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(
                 "no Vulkan loader (libvulkan.so.1) on this machine: run ./scripts/setup.sh or install libvulkan1 ({e})"
             ))
         })?;
+
+        // the loader may be older than the version that skylit needs
         // SAFETY: no preconditions
         let version = unsafe { entry.try_enumerate_instance_version() }
             .map_err(|r| explain_loader("querying the Vulkan version", r))?
@@ -75,6 +82,8 @@ impl Instance {
                 vk::api_version_minor(version)
             )));
         }
+
+        // the layer and extensions that diagnostics need
         // SAFETY: no preconditions
         let layers =
             unsafe { entry.enumerate_instance_layer_properties() }.map_err(|r| explain_loader("listing Vulkan layers", r))?;
@@ -111,6 +120,8 @@ impl Instance {
         // SAFETY: all pointers in `info` outlive the call
         let raw =
             unsafe { entry.create_instance(&info, None) }.map_err(|r| explain_loader("creating the Vulkan instance", r))?;
+
+        // messages of the validation layer go to a log
         let messenger = match &log {
             Some(log) => {
                 let utils = ext::debug_utils::Instance::new(&entry, &raw);
@@ -125,7 +136,8 @@ impl Instance {
     }
 }
 
-/// The error for a call of the loader that failed. A broken manifest of a driver or layer is reported as if memory had run out, so manifests are looked at before that is believed.
+/// The error for a call of the loader that failed. A broken manifest of a driver or layer is
+/// reported as if memory had run out, so manifests are looked at before that is believed.
 fn explain_loader(what: &str, result: vk::Result) -> Error {
     use vk::Result as R;
     let may_be_manifest =
@@ -151,7 +163,8 @@ fn messenger_info(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfo
 }
 
 /// # Safety
-/// `user` points to the [`ValidationLog`] of a living [`Instance`], `data` to a message, as Vulkan promises.
+/// `user` points to the [`ValidationLog`] of a living [`Instance`], `data` to a message, as Vulkan
+/// promises.
 unsafe extern "system" fn on_message(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _types: vk::DebugUtilsMessageTypeFlagsEXT,

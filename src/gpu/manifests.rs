@@ -1,4 +1,5 @@
-//! Manifests of drivers and layers, which the Vulkan loader reads: JSON files that name a library. Of one that is broken the loader says that memory has run out.
+//! Manifests of drivers and layers, which the Vulkan loader reads: JSON files that name a library.
+//! Of one that is broken the loader says that memory has run out.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -8,14 +9,14 @@ use serde_json::Value;
 use crate::error::Error;
 use crate::files;
 
-/// What a manifest is of.
+/// Kind of library that a manifest names.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum ManifestKind {
     Driver,
     Layer,
 }
 
-impl Kind {
+impl ManifestKind {
     fn name(self) -> &'static str {
         match self {
             Self::Driver => "driver",
@@ -33,32 +34,37 @@ impl Kind {
 }
 
 /// Variables that name manifests, or folders of them, in place of the system's or besides.
-const VARIABLES: [(&str, Kind); 7] = [
-    ("VK_DRIVER_FILES", Kind::Driver),
-    ("VK_ICD_FILENAMES", Kind::Driver),
-    ("VK_ADD_DRIVER_FILES", Kind::Driver),
-    ("VK_LAYER_PATH", Kind::Layer),
-    ("VK_ADD_LAYER_PATH", Kind::Layer),
-    ("VK_IMPLICIT_LAYER_PATH", Kind::Layer),
-    ("VK_ADD_IMPLICIT_LAYER_PATH", Kind::Layer),
+const VARIABLES: [(&str, ManifestKind); 7] = [
+    ("VK_DRIVER_FILES", ManifestKind::Driver),
+    ("VK_ICD_FILENAMES", ManifestKind::Driver),
+    ("VK_ADD_DRIVER_FILES", ManifestKind::Driver),
+    ("VK_LAYER_PATH", ManifestKind::Layer),
+    ("VK_ADD_LAYER_PATH", ManifestKind::Layer),
+    ("VK_IMPLICIT_LAYER_PATH", ManifestKind::Layer),
+    ("VK_ADD_IMPLICIT_LAYER_PATH", ManifestKind::Layer),
 ];
 /// Folders of manifests below each folder of data or configuration.
-const FOLDERS: [(&str, Kind); 3] =
-    [("vulkan/icd.d", Kind::Driver), ("vulkan/implicit_layer.d", Kind::Layer), ("vulkan/explicit_layer.d", Kind::Layer)];
+const FOLDERS: [(&str, ManifestKind); 3] = [
+    ("vulkan/icd.d", ManifestKind::Driver),
+    ("vulkan/implicit_layer.d", ManifestKind::Layer),
+    ("vulkan/explicit_layer.d", ManifestKind::Layer),
+];
 
-/// The error for the first manifest of a driver that has a list in the place of an object, which the loader does not survive. To be looked for before the loader is called.
+/// The error for the first manifest of a driver that has a list in the place of an object, which
+/// the loader does not survive. To be looked for before the loader is called.
 pub(super) fn deadly() -> Option<Error> {
     let is_list = |value: &Value| value.as_array().is_some_and(|all| !all.is_empty());
     first_with(&variable, &|file, kind| {
         let value: Value = serde_json::from_slice(&files::read_regular(file).ok()?).ok()?;
-        let is_deadly = kind == Kind::Driver && (is_list(&value) || value.get("ICD").is_some_and(is_list));
+        let is_deadly = kind == ManifestKind::Driver && (is_list(&value) || value.get("ICD").is_some_and(is_list));
         if is_deadly { fault(file, kind) } else { None }
     })
 }
 
-/// The error for drivers that variables name and of which none can be used; `None` if no variable names any.
+/// The error for drivers that variables name and of which none can be used; `None` if no variable
+/// names any.
 pub(super) fn unusable() -> Option<Error> {
-    VARIABLES.iter().filter(|(_, kind)| *kind == Kind::Driver).find_map(|(name, _)| {
+    VARIABLES.iter().filter(|(_, kind)| *kind == ManifestKind::Driver).find_map(|(name, _)| {
         let value = variable(name)?;
         let files = value.to_string_lossy();
         Some(Error::Device(format!(
@@ -71,13 +77,18 @@ fn variable(name: &str) -> Option<OsString> {
     std::env::var_os(name).filter(|value| !value.is_empty())
 }
 
-/// The error for the first manifest that is broken: where variables name it, then in the folders of the user and the system. `None` if all are as they should be.
+/// The error for the first manifest that is broken: where variables name it, then in the folders of
+/// the user and the system. `None` if all are as they should be.
 pub(super) fn broken() -> Option<Error> {
     first_with(&variable, &fault)
 }
 
-/// The error for the first manifest of which `fault` finds something. `variable` gives the variables that are set.
-fn first_with(variable: &dyn Fn(&str) -> Option<OsString>, fault: &dyn Fn(&Path, Kind) -> Option<String>) -> Option<Error> {
+/// The error for the first manifest of which `fault` finds something. `variable` gives the
+/// variables that are set.
+fn first_with(
+    variable: &dyn Fn(&str) -> Option<OsString>,
+    fault: &dyn Fn(&Path, ManifestKind) -> Option<String>,
+) -> Option<Error> {
     let named = VARIABLES.iter().flat_map(|&(name, kind)| {
         let paths = variable(name).map_or_else(Vec::new, |value| std::env::split_paths(&value).collect());
         paths.into_iter().filter(|path| !path.as_os_str().is_empty()).map(move |path| (Some(name), kind, path))
@@ -113,7 +124,8 @@ fn bases(variable: &dyn Fn(&str) -> Option<OsString>) -> Vec<PathBuf> {
     user.chain(system.into_iter().flatten()).collect()
 }
 
-/// The manifests that a path names: itself, or those in the folder. A path that is not there names itself if it `is_asked_for`.
+/// The manifests that a path names: itself, or those in the folder. A path that is not there names
+/// itself if it `is_asked_for`.
 fn manifests(path: &Path, is_asked_for: bool) -> Vec<PathBuf> {
     match std::fs::read_dir(path) {
         Ok(entries) => {
@@ -127,8 +139,8 @@ fn manifests(path: &Path, is_asked_for: bool) -> Vec<PathBuf> {
     }
 }
 
-/// What is wrong with a manifest; `None` for one that names a library which may be there.
-fn fault(file: &Path, kind: Kind) -> Option<String> {
+/// Says what is wrong with a manifest; `None` for one that names a library which may be there.
+fn fault(file: &Path, kind: ManifestKind) -> Option<String> {
     let text = match files::read_regular(file) {
         Ok(text) => text,
         Err(e) => {
@@ -145,7 +157,7 @@ fn fault(file: &Path, kind: Kind) -> Option<String> {
     let Some(content) = kind.keys().iter().find_map(|key| value.get(key)) else {
         return Some(format!("it has no `{}`", kind.keys()[0]));
     };
-    if kind == Kind::Layer {
+    if kind == ManifestKind::Layer {
         return None;
     }
     if content.get("library_path").is_some() && content.get("api_version").is_none() {
@@ -172,7 +184,7 @@ mod tests {
         let at = |name: &str| dir.path().join(name);
         let good = r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "libvulkan_lvp.so", "api_version": "1.3.0"}}"#;
         std::fs::write(at("good.json"), good).unwrap();
-        let of = |name: &'static str, path: PathBuf| {
+        let first_error = |name: &'static str, path: PathBuf| {
             let variable = move |asked: &str| match asked {
                 "XDG_DATA_DIRS" | "XDG_CONFIG_DIRS" | "XDG_CONFIG_HOME" | "XDG_DATA_HOME" => Some("/nonexistent".into()),
                 _ => (asked == name).then(|| path.clone().into_os_string()),
@@ -180,7 +192,7 @@ mod tests {
             first_with(&variable, &fault).map(|e| (e.exit_code(), e.to_string()))
         };
         // the machine's own are as they should be
-        assert_eq!(of("VK_DRIVER_FILES", at("good.json")), None);
+        assert_eq!(first_error("VK_DRIVER_FILES", at("good.json")), None);
         let broken = [
             ("{\"x", "it is not JSON ("),
             ("", "it is not JSON ("),
@@ -199,14 +211,14 @@ mod tests {
             for name in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES"] {
                 let both = std::env::join_paths([at("good.json"), at("broken.json")]).unwrap();
                 for path in [at("broken.json"), dir.path().to_owned(), both.into()] {
-                    let (code, error) = of(name, path).unwrap();
+                    let (code, error) = first_error(name, path).unwrap();
                     assert!(code == 2 && error.starts_with(&format!("{name} names {file}, which is no manifest")), "{error}");
                     assert!(error.contains(why) && error.lines().count() == 1, "{error}");
                 }
             }
         }
-        assert!(of("VK_DRIVER_FILES", at("missing.json")).unwrap().1.contains("no such file"));
-        assert!(of("VK_LAYER_PATH", dir.path().to_owned()).unwrap().1.contains("no manifest of a Vulkan layer"));
+        assert!(first_error("VK_DRIVER_FILES", at("missing.json")).unwrap().1.contains("no such file"));
+        assert!(first_error("VK_LAYER_PATH", dir.path().to_owned()).unwrap().1.contains("no manifest of a Vulkan layer"));
         // one that was installed
         std::fs::create_dir_all(at("data/vulkan/icd.d")).unwrap();
         std::fs::rename(at("broken.json"), at("data/vulkan/icd.d/broken.json")).unwrap();

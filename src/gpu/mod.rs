@@ -1,5 +1,5 @@
-//! A thin layer over Vulkan: device, memory, pipelines, submission, timing. Its functions are safe, with the preconditions that their
-//! comments state; `unsafe` stays in this folder and in `tracer`.
+//! A thin layer over Vulkan: device, memory, pipelines, submission, timing. Its functions are safe,
+//! with the preconditions that their comments state; `unsafe` stays in this folder and in `tracer`.
 
 mod acceleration_structure;
 mod buffer;

@@ -1,5 +1,5 @@
-//! Intel Open Image Denoise, loaded at run time where it is installed, so that skylit starts without it. Versions 1.4 to 2 have the same
-//! functions, except for the names of two.
+//! Intel Open Image Denoise, loaded at run time where it is installed, so that skylit starts
+//! without it. Versions 1.4 to 2 have the same functions, except for the names of two.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null;
@@ -80,11 +80,13 @@ impl Oidn {
         &self.version
     }
 
-    /// Denoises an image of `size` pixels. All planes have three floats per pixel, rows from the top: `color` is linear radiance, `albedo`
-    /// linear in [0, 1], `normal` a world-space vector of length at most 1. The two auxiliary planes may be noisy.
+    /// Denoises an image of `size` pixels. All planes have three floats per pixel, rows from the
+    /// top: `color` is linear radiance, `albedo` linear in [0, 1], `normal` a world-space vector of
+    /// length at most 1. The two auxiliary planes may be noisy.
     ///
     /// # Errors
-    /// [`Error::Usage`] for planes of other sizes, [`Error::OutOfMemory`], and [`Error::Device`] with the library's message.
+    /// [`Error::Usage`] for planes of other sizes, [`Error::OutOfMemory`], and [`Error::Device`]
+    /// with the library's message.
     pub fn denoise(&self, size: [u32; 2], color: &[f32], albedo: &[f32], normal: &[f32]) -> Result<Vec<f32>> {
         let [width, height] = size.map(|n| n as usize);
         let images = [(c"color", color), (c"albedo", albedo), (c"normal", normal)];
@@ -94,8 +96,8 @@ impl Oidn {
             )));
         }
         let (f, mut out) = (&self.functions, vec![0.0f32; 3 * width * height]);
-        // SAFETY: device and filter exist; names end with 0; every plane has 3 * width * height floats and outlives the filter, and the
-        // library writes to none but the output
+        // SAFETY: device and filter exist; names end with 0; every plane has 3 * width * height
+        // floats and outlives the filter, and the library writes to none but the output
         unsafe {
             let filter = (f.new_filter)(self.device, c"RT".as_ptr());
             if filter.is_null() {
@@ -128,10 +130,11 @@ impl Oidn {
         if code == ERROR_NONE {
             return Ok(());
         }
-        let text = match message.is_null() {
-            true => format!("error {code}"),
+        let text = if message.is_null() {
+            format!("error {code}")
+        } else {
             // SAFETY: the library's string stays valid until the next call
-            false => unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned(),
+            unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned()
         };
         Err(match code {
             ERROR_OUT_OF_MEMORY => Error::OutOfMemory(format!("Open Image Denoise: {text}; render a smaller image")),

@@ -1,7 +1,9 @@
-//! Compute and ray-tracing pipelines. There are no descriptor sets: everything is reached by address from push constants.
+//! Compute and ray-tracing pipelines. There are no descriptor sets: everything is reached by
+//! address from push constants.
 //!
-//! A pipeline is a shared handle: the device knows the pipelines in use, and returns the same one for the same SPIR-V and the same
-//! specialization. [`Device::live_pipelines`] keeps pipelines alive beyond the work that they were compiled for.
+//! A pipeline is a shared handle: the device knows the pipelines in use, and returns the same one
+//! for the same SPIR-V and the same specialization. [`Device::live_pipelines`] keeps pipelines
+//! alive beyond the work that they were compiled for.
 
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
@@ -63,11 +65,12 @@ pub(super) struct Module<'a> {
 }
 
 impl<'a> Module<'a> {
-    /// With its specialization constants set: pipelines need not set them.
+    /// Creates a module whose specialization constants are set: pipelines need not set them.
     pub(super) fn new(device: &'a Device, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
         let words = specialize(&shader.spirv()?, &specialization.entries, device.info.is_cpu())
             .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
-        // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the validation layer looks at it in tests
+        // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the
+        // validation layer looks at it in tests
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(name)?;
         device.name(raw, name);
@@ -89,7 +92,8 @@ pub(super) fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk
         .context("the pipeline layout")
 }
 
-/// The identity of a pipeline: hashes of its shaders' SPIR-V (of the contents, because live-compiled shaders change), their specialization, and creation flags.
+/// The identity of a pipeline: hashes of its shaders' SPIR-V (of the contents, because
+/// live-compiled shaders change), their specialization, and creation flags.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     shaders: Vec<u128>,
@@ -151,7 +155,8 @@ impl Drop for CompileTimer {
 /// The pipelines of a device that are in use.
 pub(super) struct LivePipelines {
     all: Mutex<HashMap<Key, Weak<Compiled>>>,
-    /// The pipelines compiled last, at most `max_kept`. They hold their device, which is then never closed.
+    /// The pipelines compiled last, at most `max_kept`. They hold their device, which is then never
+    /// closed.
     kept: Mutex<VecDeque<Arc<Compiled>>>,
     max_kept: usize,
     /// How many have been compiled.
@@ -200,13 +205,15 @@ pub struct KeptPipelines {
 }
 
 impl Device {
-    /// Handles of all pipelines in use. While they are kept, requesting one of these pipelines again does not compile it.
+    /// Handles of all pipelines in use. While they are kept, requesting one of these pipelines
+    /// again does not compile it.
     pub fn live_pipelines(&self) -> KeptPipelines {
         let all = self.live.all.lock().unwrap_or_else(PoisonError::into_inner);
         KeptPipelines { pipelines: all.values().filter_map(Weak::upgrade).collect() }
     }
 
-    /// Number of pipelines that have been compiled with this device, whether they came from the driver's cache or not.
+    /// Number of pipelines that have been compiled with this device, whether they came from the
+    /// driver's cache or not.
     pub fn compiled_pipelines(&self) -> u64 {
         self.live.compiled.load(Ordering::Relaxed)
     }
@@ -222,8 +229,8 @@ impl ComputePipeline {
         Self::with_flags(device, name, shader, specialization, vk::PipelineShaderStageCreateFlags::empty())
     }
 
-    /// As [`ComputePipeline::new`], for a shader that requires full subgroups of the reported size; the device must have
-    /// [`super::Limits::packets`].
+    /// As [`ComputePipeline::new`], for a shader that requires full subgroups of the reported size;
+    /// the device must have [`super::Limits::packets`].
     pub fn with_full_subgroups(device: &Arc<Device>, name: &str, shader: &Shader, s: &Specialization) -> Result<Self> {
         Self::with_flags(device, name, shader, s, vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
     }
@@ -296,8 +303,9 @@ pub struct HitShaders<'a> {
     pub sphere: Option<[&'a Shader; 2]>,
 }
 
-/// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1 alpha-tested triangles, 2 spheres
-/// (unused groups repeat group 0, so that the indices are always the same).
+/// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1
+/// alpha-tested triangles, 2 spheres (unused groups repeat group 0, so that the indices are always
+/// the same).
 #[derive(Clone)]
 pub struct RayTracingPipeline(Arc<Compiled>);
 
@@ -341,6 +349,8 @@ impl RayTracingPipeline {
             (module("miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
             (module("triangle closest hit", shared.triangle_closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR),
         ];
+
+        // groups in the order that the structures' instances name: opaque, with alpha, spheres
         let unused = vk::SHADER_UNUSED_KHR;
         let general = |index| {
             vk::RayTracingShaderGroupCreateInfoKHR::default()
@@ -359,6 +369,8 @@ impl RayTracingPipeline {
                 .intersection_shader(unused)
         };
         let mut groups = vec![general(0), general(1), triangles(unused), triangles(unused), triangles(unused)];
+
+        // kinds of geometry that the scene lacks have no shaders
         if let Some(any) = shared.triangle_any {
             groups[3] = triangles(modules.len() as u32);
             modules.push((module("triangle any hit", any)?, vk::ShaderStageFlags::ANY_HIT_KHR));
@@ -374,6 +386,7 @@ impl RayTracingPipeline {
             modules.push((module("sphere closest hit", closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR));
             modules.push((module("sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
         }
+
         let layout = layout(device, RAY_STAGES)?;
         let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
         let stages: Vec<_> = modules
@@ -410,7 +423,8 @@ impl RayTracingPipeline {
 }
 
 impl Table {
-    /// Writes the group handles with the device's sizes and alignments: raygen, miss, then the hit groups.
+    /// Writes the group handles with the device's sizes and alignments: raygen, miss, then the hit
+    /// groups.
     fn new(functions: &ash::khr::ray_tracing_pipeline::Device, pipeline: &Compiled, groups: u32) -> Result<Self> {
         let limits = &pipeline.device.info.limits;
         let size = limits.shader_group_handle_size as usize;

@@ -1,22 +1,26 @@
-//! How many more threads this process may have. A driver that cannot start one of its threads waits for it forever, so there has to be room before it is loaded.
+//! How many more threads this process may have. A driver that cannot start one of its threads waits
+//! for it forever, so there has to be room before it is loaded.
 
-/// Threads that a driver of the CPU starts besides those that its work is divided among: for its shader cache, for its queue, and one more.
+/// Threads that a driver of the CPU starts besides those that its work is divided among: for its
+/// shader cache, for its queue, and one more.
 const DRIVER_BASE: usize = 3;
 /// Most threads that Mesa divides its work among.
 const MAX_WORKERS: usize = 32;
 /// Threads of ours that may start after the driver has been loaded.
 const SPARE: usize = 2;
 
-/// What the smallest driver and our own threads beside the pool take.
+/// Threads that the smallest driver takes, and our own beside the pool.
 pub const RESERVED: usize = threads_of_driver(1) + SPARE + 2;
 
-/// Threads of a driver of the CPU with `workers` in each of its two pools, for rasterization and for compute shaders.
+/// Threads of a driver of the CPU with `workers` in each of its two pools, for rasterization and
+/// for compute shaders.
 const fn threads_of_driver(workers: usize) -> usize {
     DRIVER_BASE + 2 * workers
 }
 
-/// Counts how many of `wanted` threads this process may have besides those that it has. It starts them and ends them again: limits of the user (`ulimit -u`), of a container and of
-/// memory are told by nothing else.
+/// Counts how many of `wanted` threads this process may have besides those that it has. It starts
+/// them and ends them again: limits of the user (`ulimit -u`), of a container and of memory are
+/// told by nothing else.
 pub fn room(wanted: usize) -> usize {
     #[cfg(target_os = "linux")]
     return linux::room(wanted);
@@ -24,13 +28,15 @@ pub fn room(wanted: usize) -> usize {
     wanted
 }
 
-/// Workers that a driver of the CPU is to have in each pool in place of `wanted`, or of one for each processor; `None` where there is no room for one.
+/// Workers that a driver of the CPU is to have in each pool in place of `wanted`, or of one for
+/// each processor; `None` where there is no room for one.
 pub(super) fn driver_workers(wanted: Option<usize>) -> Option<usize> {
     let wanted = workers(wanted);
     workers_within(wanted, room(threads_of_driver(wanted) + SPARE))
 }
 
-/// Workers that a driver of the CPU has in each pool if it is asked for these, or for one for each processor.
+/// Workers that a driver of the CPU has in each pool if it is asked for these, or for one for each
+/// processor.
 pub(super) fn workers(wanted: Option<usize>) -> usize {
     wanted.unwrap_or_else(processors).min(MAX_WORKERS)
 }
@@ -82,9 +88,11 @@ mod linux {
         threads.len()
     }
 
-    /// Starts a thread that ends when the gate opens. Not by the standard library: its threads allocate, and the C library then reserves 64 MiB of addresses for each.
+    /// Starts a thread that ends when the gate opens. Not by the standard library: its threads
+    /// allocate, and the C library then reserves 64 MiB of addresses for each.
     fn start(gate: &Mutex<()>) -> Option<libc::pthread_t> {
-        // SAFETY: all zeros is a value of both types, which the calls below fill; the gate outlives the thread, which `room` joins
+        // SAFETY: all zeros is a value of both types, which the calls below fill; the gate outlives
+        // the thread, which `room` joins
         unsafe {
             let (mut attributes, mut thread) = (std::mem::zeroed::<libc::pthread_attr_t>(), std::mem::zeroed());
             if libc::pthread_attr_init(&mut attributes) != 0 {

@@ -1,4 +1,5 @@
-//! A window's swapchain, and egui's triangles drawn into it: on a device of its own, so that the window neither waits for what is traced nor is lost with it.
+//! A window's swapchain, and egui's triangles drawn into it: on a device of its own, so that the
+//! window neither waits for what is traced nor is lost with it.
 
 use std::ffi::CStr;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use super::instance::Instance;
 use super::result::{Context, explain};
 use crate::error::{Error, Result};
 
-/// What a window is drawn to: it says which window and display that is, and lives as long as the renderer.
+/// A window to draw to: it says which window and display that is, and lives as long as the
+/// renderer.
 pub trait Target: HasDisplayHandle + HasWindowHandle {}
 
 impl<T: HasDisplayHandle + HasWindowHandle> Target for T {}
@@ -54,7 +56,8 @@ struct Swapchain {
 }
 
 impl WindowRenderer {
-    /// Opens a device that can present to the window: the one of this name if there is one, else the first.
+    /// Opens a device that can present to the window: the one of this name if there is one, else
+    /// the first.
     ///
     /// # Errors
     /// [`Error::Device`] where no device can present to it; [`Error::Vulkan`].
@@ -64,10 +67,13 @@ impl WindowRenderer {
         let window = target.window_handle().map_err(no_handle)?.as_raw();
         let extensions = ash_window::enumerate_required_extensions(display).context("listing extensions of surfaces")?;
         let instance = Instance::with_extensions(validation, extensions)?;
+
         // SAFETY: the handles are those of a window that lives as long as the surface
         let surface = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
             .context("creating the window's surface")?;
         let surfaces = khr::surface::Instance::new(&instance.entry, &instance.raw);
+
+        // a device that can present to this surface; without one the surface goes again
         let chosen = choose(&instance, &surfaces, surface, device_name);
         let created =
             chosen.and_then(|(physical, family)| create_device(&instance, physical, family).map(|d| (physical, family, d)));
@@ -79,7 +85,9 @@ impl WindowRenderer {
                 return Err(e);
             }
         };
-        // SAFETY (all calls below): plain objects of the living device; on an early return Drop destroys null handles, too
+
+        // SAFETY (all calls below): plain objects of the living device; on an early return Drop
+        // destroys null handles, too
         let queue = unsafe { device.get_device_queue(family, 0) };
         let mut renderer = Self {
             egui: None,
@@ -106,6 +114,8 @@ impl WindowRenderer {
     /// Creates what does not depend on the window's size.
     fn prepare(&mut self, family: u32) -> Result<()> {
         let what = "preparing the window";
+
+        // a format of sRGB if there is one: the presentation engine then encodes
         // SAFETY (all calls below): plain objects of the living device
         let formats =
             unsafe { self.surfaces.get_physical_device_surface_formats(self.physical, self.surface) }.context(what)?;
@@ -113,6 +123,8 @@ impl WindowRenderer {
             [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB, vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
         let found = wanted.iter().find_map(|w| formats.iter().find(|f| f.format == *w)).or(formats.first());
         self.format = *found.ok_or_else(|| Error::Device("the window has no format of pixels".into()))?;
+
+        // one pass that clears the image and leaves it ready to be presented
         let attachment = [vk::AttachmentDescription::default()
             .format(self.format.format)
             .samples(vk::SampleCountFlags::TYPE_1)
@@ -122,6 +134,7 @@ impl WindowRenderer {
             .final_layout(vk::ImageLayout::PRESENT_SRC_KHR)];
         let reference = [vk::AttachmentReference { attachment: 0, layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL }];
         let subpass = [vk::SubpassDescription::default().color_attachments(&reference)];
+
         // the image is there once the semaphore that is waited for at this stage is signaled
         let dependency = [vk::SubpassDependency {
             src_subpass: vk::SUBPASS_EXTERNAL,
@@ -134,6 +147,8 @@ impl WindowRenderer {
         }];
         let pass = vk::RenderPassCreateInfo::default().attachments(&attachment).subpasses(&subpass).dependencies(&dependency);
         self.render_pass = unsafe { self.device.create_render_pass(&pass, None) }.context(what)?;
+
+        // one frame is in flight: a command buffer, a fence and a semaphore do
         let pool = vk::CommandPoolCreateInfo::default()
             .queue_family_index(family)
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
@@ -142,6 +157,8 @@ impl WindowRenderer {
         self.commands = unsafe { self.device.allocate_command_buffers(&buffers) }.context(what)?[0];
         self.fence = unsafe { self.device.create_fence(&vk::FenceCreateInfo::default(), None) }.context(what)?;
         self.available = unsafe { self.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }.context(what)?;
+
+        // the painter has to know who encodes
         let srgb_framebuffer = [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB].contains(&self.format.format);
         let options = Options { srgb_framebuffer, ..Default::default() };
         let (instance, device) = (&self.instance.raw, self.device.clone());
@@ -162,7 +179,8 @@ impl WindowRenderer {
         self.instance.validation.as_ref().map(|v| v.take()).unwrap_or_default()
     }
 
-    /// Draws a frame into a window of `size` physical pixels, none of which is 0, over a background (linear RGB).
+    /// Draws a frame into a window of `size` physical pixels, none of which is 0, over a background
+    /// (linear RGB).
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Vulkan`].
@@ -175,6 +193,8 @@ impl WindowRenderer {
         textures: &egui::TexturesDelta,
     ) -> Result<()> {
         let what = "drawing the window";
+
+        // textures first: the frame may show them
         if let Some(egui) = &mut self.egui {
             egui.set_textures(self.queue, self.pool, &textures.set).map_err(failed)?;
         }
@@ -182,7 +202,9 @@ impl WindowRenderer {
         if (self.swapchain.is_stale || is_other_size) && !self.recreate(size)? {
             return self.free(textures);
         }
-        // SAFETY (all calls below): one frame is in flight at a time, and its fence was waited for, so that nothing of it is in use
+
+        // SAFETY (all calls below): one frame is in flight at a time, and its fence was waited for,
+        // so that nothing of it is in use
         let acquired =
             unsafe { self.swapchains.acquire_next_image(self.swapchain.raw, u64::MAX, self.available, vk::Fence::null()) };
         let index = match acquired {
@@ -197,6 +219,8 @@ impl WindowRenderer {
             }
             Err(e) => return Err(explain(what, e)),
         };
+
+        // commands of the frame
         let extent = self.swapchain.extent;
         let [r, g, b] = background;
         let clear = [vk::ClearValue { color: vk::ClearColorValue { float32: [r, g, b, 1.0] } }];
@@ -226,6 +250,8 @@ impl WindowRenderer {
                 .signal_semaphores(&finished)];
             self.device.queue_submit(self.queue, &submit, self.fence).context(what)?;
         }
+
+        // presented once drawing has finished; then nothing is in flight any more
         let (swapchain, indices) = ([self.swapchain.raw], [index]);
         let present = vk::PresentInfoKHR::default().wait_semaphores(&finished).swapchains(&swapchain).image_indices(&indices);
         let presented = unsafe { self.swapchains.queue_present(self.queue, &present) };
@@ -245,11 +271,15 @@ impl WindowRenderer {
         self.egui.as_mut().map_or(Ok(()), |egui| egui.free_textures(&textures.free)).map_err(failed)
     }
 
-    /// Creates the swapchain anew at the window's size. Returns false if the window has no pixels now.
+    /// Creates the swapchain anew at the window's size. Returns false if the window has no pixels
+    /// now.
     fn recreate(&mut self, size: [u32; 2]) -> Result<bool> {
         let what = "creating the swapchain";
-        // SAFETY (all calls below): the device is idle, so that nothing of the old swapchain is in use
+        // SAFETY (all calls below): the device is idle, so that nothing of the old swapchain is in
+        // use
         unsafe { self.device.device_wait_idle() }.context(what)?;
+
+        // the size that the surface has, or takes
         let capabilities =
             unsafe { self.surfaces.get_physical_device_surface_capabilities(self.physical, self.surface) }.context(what)?;
         let (least, most, now) = (capabilities.min_image_extent, capabilities.max_image_extent, capabilities.current_extent);
@@ -264,6 +294,7 @@ impl WindowRenderer {
         if extent.width == 0 || extent.height == 0 {
             return Ok(false);
         }
+
         // 0: no limit
         let most_images = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let count = (capabilities.min_image_count + 1).min(most_images);
@@ -271,6 +302,8 @@ impl WindowRenderer {
             .into_iter()
             .find(|a| capabilities.supported_composite_alpha.contains(*a))
             .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE);
+
+        // the old swapchain is retired by the new one
         let old = std::mem::take(&mut self.swapchain);
         let create = vk::SwapchainCreateInfoKHR::default()
             .surface(self.surface)
@@ -288,6 +321,8 @@ impl WindowRenderer {
         let raw = unsafe { self.swapchains.create_swapchain(&create, None) }.context(what);
         self.destroy(old);
         self.swapchain = Swapchain { raw: raw?, extent, ..Default::default() };
+
+        // a view, a framebuffer and a semaphore for each image
         let images = unsafe { self.swapchains.get_swapchain_images(self.swapchain.raw) }.context(what)?;
         for image in images {
             let view = vk::ImageViewCreateInfo::default()
@@ -332,7 +367,8 @@ impl WindowRenderer {
 
 impl Drop for WindowRenderer {
     fn drop(&mut self) {
-        // SAFETY: the device is idle (or lost), and the objects are destroyed before what they were created from
+        // SAFETY: the device is idle (or lost), and the objects are destroyed before what they were
+        // created from
         unsafe {
             let _ = self.device.device_wait_idle();
             drop(self.egui.take());

@@ -1,8 +1,10 @@
 //! Compares two tracers' hits of the same rays without an oracle over the whole scene.
 //!
-//! Where the answers differ, a double-precision oracle over only those primitives that either of them names decides: the
-//! difference is a tie when rounding allows both answers ([`super::parity`]), unexplained otherwise. Hits that both miss are not
-//! detected; `tests/tracer/parity.rs` tests those. This suits benchmarks: scenes of 10^7 triangles with differences in a few rays.
+//! Where the answers differ, a double-precision oracle over only those primitives that either of
+//! them names decides: the difference is a tie when rounding allows both answers
+//! ([`super::parity`]), unexplained otherwise. Hits that both miss are not detected;
+//! `tests/tracer/parity.rs` tests those. This suits benchmarks: scenes of 10^7 triangles with
+//! differences in a few rays.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,8 +16,8 @@ use crate::oracle::{Oracle, OracleRay};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
 
-/// Same primitive and a parameter within this many units of the last place: agreement without consulting the oracle. It is well below
-/// the bound of [`Rounding`].
+/// Same primitive and a parameter within this many units of the last place: agreement without
+/// consulting the oracle. It is well below the bound of [`Rounding`].
 const SAME_T_ULPS: f32 = 4.0;
 
 /// Are two closest hits equal within [`SAME_T_ULPS`]?
@@ -36,12 +38,12 @@ fn same(a: &Hit, b: &Hit) -> bool {
 pub struct Agreement {
     /// How many rays agree, and what the others are.
     pub report: ParityReport,
-    /// Of the unexplained, those where the reference's answer is one that rounding does not allow.
+    /// Unexplained rays where the reference's answer is one that rounding does not allow.
     pub reference_unexplained: u64,
 }
 
-/// Compares closest hits; `hits` are judged against `reference`. Rays are relative to `scene.origin()`. Surplus entries of
-/// the longer slices are ignored.
+/// Compares closest hits; `hits` are judged against `reference`. Rays are relative to
+/// `scene.origin()`. Surplus entries of the longer slices are ignored.
 pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[Hit]) -> Agreement {
     let n = rays.len().min(hits.len()).min(reference.len());
     let differing: Vec<usize> = (0..n).filter(|&i| !same(&hits[i], &reference[i])).collect();
@@ -70,8 +72,9 @@ pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[H
     Agreement { report: report.merge(restore(judged, &differing, &small)), reference_unexplained }
 }
 
-/// Compares answers to "is anything in the way?". `named` are closest hits of the rays in question, from either tracer or
-/// both: called with the indices of the rays that differ, it says which primitives could decide.
+/// Compares answers to "is anything in the way?". `named` are closest hits of the rays in question,
+/// from either tracer or both: called with the indices of the rays that differ, it says which
+/// primitives could decide.
 ///
 /// # Errors
 /// Those of `named`.
@@ -128,13 +131,15 @@ struct Reduced {
     oracle: Oracle,
     /// Mesh of each instance.
     meshes: Vec<usize>,
-    /// Of each mesh: which primitives are left, in order.
+    /// Primitives that are left of each mesh, in order.
     kept: HashMap<usize, Vec<u32>>,
 }
 
 impl Reduced {
     fn new<'a>(scene: &Scene, hits: impl Iterator<Item = &'a Hit>) -> Self {
         let meshes: Vec<usize> = scene.instances.iter().map(|i| i.mesh).collect();
+
+        // primitives that some hit names
         let mut sets: HashMap<usize, HashSet<u32>> = HashMap::new();
         for h in hits {
             if let Some(&mesh) = meshes.get(h.instance as usize) {
@@ -150,6 +155,8 @@ impl Reduced {
                 (mesh, list)
             })
             .collect();
+
+        // a scene of these alone: the oracle is quick, and its answers are the same
         let mut small = Scene {
             instances: scene.instances.clone(),
             materials: scene.materials.clone(),

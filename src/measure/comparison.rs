@@ -1,4 +1,5 @@
-//! Two images by all metrics: which of their channels are compared, over which pixels, and how they differ.
+//! Two images by all metrics: which of their channels are compared, over which pixels, and how they
+//! differ.
 
 use super::flip::{PIXELS_PER_DEGREE, flip, flip_hdr};
 use super::mask::{Mask, MaskOptions};
@@ -8,25 +9,26 @@ use crate::colour::srgb_encode;
 use crate::error::{Error, Result};
 use crate::output::{Image, Samples, exr, png};
 
-/// A pixel is an outlier if its difference is more than this many standard errors of the two images.
+/// A pixel is an outlier if its difference is more than this many standard errors of the two
+/// images.
 pub const OUTLIER_ERRORS: f64 = 6.0;
-/// And more than this: half a step of an 8-bit image.
+/// An outlier's difference is also more than this: half a step of an 8-bit image.
 pub const OUTLIER_LEAST: f64 = 0.5 / 255.0;
 
-/// What is compared.
+/// Channels and pixels that are compared.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CompareOptions {
     /// Names of channels, which both images have; empty: the colour channels.
     pub channels: Vec<String>,
-    /// Which pixels.
+    /// Conditions that pixels meet.
     pub mask: MaskOptions,
 }
 
 /// How an image differs from a reference, over the pixels of the mask that are finite in both.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Comparison {
-    /// Channels compared: `R`, `G`, `B`, or `Y` where both images are grey, or those that were asked for. A grey image has three equal channels where the other one has
-    /// colours.
+    /// Channels compared: `R`, `G`, `B`, or `Y` where both images are grey, or those that were
+    /// asked for. A grey image has three equal channels where the other one has colours.
     pub channels: Vec<String>,
     /// The mask in words. All metrics are over its pixels that are finite in both images.
     pub mask: String,
@@ -46,11 +48,13 @@ pub struct Comparison {
     pub rel_mse: f64,
     /// Peak signal-to-noise ratio, dB, for a peak of 1; infinite for equal images.
     pub psnr: f64,
-    /// SSIM of what a display shows (0 to 1, sRGB); `None` for channels that are no colours, and where no pixel is 5 pixels from the border.
+    /// SSIM of what a display shows (0 to 1, sRGB); `None` for channels that are no colours, and
+    /// where no pixel is 5 pixels from the border.
     pub ssim: Option<f64>,
     /// Mean FLIP of what a display shows, 0 to 1; `None` for channels that are no colours.
     pub flip: Option<f64>,
-    /// Mean FLIP over exposures; `None` for channels that are no colours, and where no value exceeds 1: FLIP says all then.
+    /// Mean FLIP over exposures; `None` for channels that are no colours, and where no value
+    /// exceeds 1: FLIP says all then.
     pub flip_hdr: Option<f64>,
     /// Tanimoto coefficient, 1 for equal images.
     pub tanimoto: f64,
@@ -66,7 +70,8 @@ pub struct Comparison {
     pub percentiles: Percentiles,
     /// Pixels that no mean can show.
     pub bad: BadPixels,
-    /// Root mean square of the standard errors of the reference's pixels; `None` if it has no variance.
+    /// Root mean square of the standard errors of the reference's pixels; `None` if it has no
+    /// variance.
     pub reference_standard_error: Option<f64>,
     /// Differences pixel by pixel.
     #[serde(skip)]
@@ -93,7 +98,8 @@ pub struct BadPixels {
     pub nan_in_both: u64,
     /// Pixels where one image is infinite and the other is finite, or infinite of the other sign.
     pub infinite: u64,
-    /// Pixels whose difference is more than [`OUTLIER_ERRORS`] standard errors and [`OUTLIER_LEAST`]; `None` if the reference has no variance.
+    /// Pixels whose difference is more than [`OUTLIER_ERRORS`] standard errors and
+    /// [`OUTLIER_LEAST`]; `None` if the reference has no variance.
     pub outliers: Option<u64>,
 }
 
@@ -101,7 +107,8 @@ impl Comparison {
     /// Whether the metrics say anything: pixels were compared, and none is broken.
     ///
     /// # Errors
-    /// [`Error::CheckFailed`] where no pixel was compared, and where a pixel of the mask is not a number, or infinite in one image only.
+    /// [`Error::CheckFailed`] where no pixel was compared, and where a pixel of the mask is not a
+    /// number, or infinite in one image only.
     pub fn check(&self) -> Result<()> {
         let failed = |what: String| Err(Error::CheckFailed(what));
         let count = |n: u64| if n == 1 { "1 pixel is".to_owned() } else { format!("{n} pixels are") };
@@ -127,7 +134,8 @@ impl Comparison {
 pub struct Maps {
     /// Image - reference, as many values a pixel as channels; NaN where one is not finite.
     pub difference: Vec<f32>,
-    /// FLIP of each pixel, or FLIP over exposures if there is one; empty for channels that are no colours.
+    /// FLIP of each pixel, or FLIP over exposures if there is one; empty for channels that are no
+    /// colours.
     pub flip: Vec<f32>,
     /// 1 for pixels that are compared, else 0.
     pub compared: Vec<f32>,
@@ -136,7 +144,8 @@ pub struct Maps {
 }
 
 impl BadPixels {
-    /// Pixels where exactly one image is finite, or both are infinite or not a number in different ways.
+    /// Pixels where exactly one image is finite, or both are infinite or not a number in different
+    /// ways.
     pub fn not_finite(&self) -> u64 {
         self.nan + self.infinite
     }
@@ -145,8 +154,9 @@ impl BadPixels {
 /// Compares an image with a reference.
 ///
 /// # Errors
-/// [`Error::CheckFailed`] for images of different size, [`Error::Usage`] for channels that one of them lacks, for images without colour if no channels are named, for
-/// an 8-bit image and one with values that 8 bits cannot hold, and for masks that do not fit.
+/// [`Error::CheckFailed`] for images of different size, [`Error::Usage`] for channels that one of
+/// them lacks, for images without colour if no channels are named, for an 8-bit image and one with
+/// values that 8 bits cannot hold, and for masks that do not fit.
 pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Result<Comparison> {
     check_size(image, reference)?;
     let (channels, planes) = select(image, reference, &options.channels)?;
@@ -155,6 +165,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     let are_colours = channels.iter().all(|c| is_colour(c)) && matches!(channels.len(), 1 | 3);
     let colours: Vec<&[f32]> = planes.iter().flatten().copied().filter(|_| are_colours).collect();
     let Mask { name: mask_name, counted: mask } = options.mask.select(image, reference, &colours)?;
+
+    // pixels that have a number in all channels of both; the others are counted by kind
     let [a, b] = [0, 1].map(|k| interleaved(&planes.iter().map(|p| p[k]).collect::<Vec<_>>()));
     let n = channels.len();
     let mut bad = BadPixels::default();
@@ -174,7 +186,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
         .collect();
     let pair = ImagePair::new(&a, &b, n, Some(&compared))?;
 
-    // how different it looks: what is not compared is alike in both, so that its differences do not reach into the windows of pixels that are
+    // how different it looks: what is not compared is alike in both, so that its differences do not
+    // reach into the windows of pixels that are
     let counts = |k: usize| compared[k / n] > 0.0;
     let known = |k: usize| if counts(k) || b[k].is_finite() { b[k] } else { 0.0 };
     let seen: [Vec<f32>; 2] =
@@ -184,10 +197,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     let exceeds = pair.values().any(|(x, y)| x > 1.0 || y > 1.0);
     let hdr = if are_colours && exceeds { flip_hdr(&seen_pair, width, PIXELS_PER_DEGREE)? } else { None };
     let shown = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| srgb_encode(v.clamp(0.0, 1.0))).collect() };
-    let ssim = match are_colours {
-        true => ssim(&ImagePair::new(&shown(&seen[0]), &shown(&seen[1]), n, Some(&compared))?, width)?,
-        false => None,
-    };
+    let ssim =
+        if are_colours { ssim(&ImagePair::new(&shown(&seen[0]), &shown(&seen[1]), n, Some(&compared))?, width)? } else { None };
 
     // counts, and what noise explains
     let errors = [image, reference].map(|image| squared_errors(image, &channels));
@@ -231,7 +242,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     })
 }
 
-/// Refuses images of different size, and those that show different parts of a plane: display windows of EXR files at different places.
+/// Refuses images of different size, and those that show different parts of a plane: display
+/// windows of EXR files at different places.
 ///
 /// # Errors
 /// [`Error::CheckFailed`].
@@ -259,11 +271,11 @@ fn is_colour(channel: &str) -> bool {
 
 /// The colour channels of an image: three, or a grey one.
 fn colours(image: &Image) -> Option<Vec<(&'static str, &[f32])>> {
-    let of = |name: &'static str| image.f32(name).map(|samples| (name, samples));
-    match (of("R"), of("G"), of("B")) {
+    let channel = |name: &'static str| image.f32(name).map(|samples| (name, samples));
+    match (channel("R"), channel("G"), channel("B")) {
         (Some(r), Some(g), Some(b)) => Some(vec![r, g, b]),
         // a single channel called R is grey, as for PNG files
-        (red, ..) => of("Y").or(red).map(|grey| vec![grey]),
+        (red, ..) => channel("Y").or(red).map(|grey| vec![grey]),
     }
 }
 
@@ -282,7 +294,7 @@ fn select<'a>(image: &'a Image, reference: &'a Image, names: &[String]) -> Resul
         let planes = names.iter().map(|n| Ok([plane(image, "the image", n)?, plane(reference, "the reference", n)?]));
         return Ok((names.to_vec(), planes.collect::<Result<_>>()?));
     }
-    let of = |image: &'a Image, which: &str| {
+    let chosen = |image: &'a Image, which: &str| {
         colours(image).ok_or_else(|| {
             let has: Vec<_> = image.channels.iter().map(|c| &*c.name).filter(|n| !n.starts_with("state.")).collect();
             Error::Usage(format!(
@@ -291,13 +303,14 @@ fn select<'a>(image: &'a Image, reference: &'a Image, names: &[String]) -> Resul
             ))
         })
     };
-    let (a, b) = (of(image, "the image")?, of(reference, "the reference")?);
+    let (a, b) = (chosen(image, "the image")?, chosen(reference, "the reference")?);
     let names = if a.len() >= b.len() { &a } else { &b };
     let at = |of: &[(&str, &'a [f32])], k: usize| of[k.min(of.len() - 1)].1;
     Ok((names.iter().map(|c| c.0.to_owned()).collect(), (0..names.len()).map(|k| [at(&a, k), at(&b, k)]).collect()))
 }
 
-/// Refuses an 8-bit image and one whose values 8 bits cannot hold: one of them is tone mapped, or clamped.
+/// Refuses an 8-bit image and one whose values 8 bits cannot hold: one of them is tone mapped, or
+/// clamped.
 fn check_encoding(image: &Image, reference: &Image, planes: &[[&[f32]; 2]]) -> Result<()> {
     let encodings = [image, reference].map(|i| i.metadata(png::ENCODING));
     for (k, which) in ["the image", "the reference"].iter().enumerate() {
@@ -318,7 +331,8 @@ fn interleaved(planes: &[&[f32]]) -> Vec<f32> {
     (0..count).flat_map(|i| planes.iter().map(move |p| p[i])).collect()
 }
 
-/// Squares of the standard errors of an image's values, interleaved; `None` if the image has no variances, or not of these channels.
+/// Squares of the standard errors of an image's values, interleaved; `None` if the image has no
+/// variances, or not of these channels.
 fn squared_errors(image: &Image, channels: &[String]) -> Option<Vec<f32>> {
     // a count of stills, of frames in real time the length of a history
     let samples: Vec<f32> = image.channels.iter().find(|c| c.name == "samples").map(|c| match &c.samples {

@@ -10,8 +10,9 @@ pub fn normal_tail(z: f64) -> f64 {
     0.5 * erfc(z * FRAC_1_SQRT_2)
 }
 
-/// The probability that a variable is at least as far from 0 as `t`, on either side: by Student's distribution with this many degrees of freedom, or the
-/// normal distribution where they are infinite. 1 for NaN: nothing is known.
+/// The probability that a variable is at least as far from 0 as `t`, on either side: by Student's
+/// distribution with this many degrees of freedom, or the normal distribution where they are
+/// infinite. 1 for NaN: nothing is known.
 pub fn two_sided(t: f64, freedom: f64) -> f64 {
     if t.is_nan() {
         return 1.0;
@@ -23,13 +24,15 @@ pub fn two_sided(t: f64, freedom: f64) -> f64 {
     beta_reg(0.5 * freedom, 0.5, freedom / (freedom + t * t))
 }
 
-/// The probability that the least of `count` independent probabilities is below `p` by chance (Sidak 1967).
+/// The probability that the least of `count` independent probabilities is below `p` by chance
+/// (Sidak 1967).
 pub fn sidak(p: f64, count: f64) -> f64 {
     -(count * (-p.min(1.0)).ln_1p()).exp_m1()
 }
 
-/// The distance from 0 that all of `count` independent variables stay within with probability 1 - `alpha`: variables of Student's distribution with this many
-/// degrees of freedom, normal ones where they are infinite.
+/// The distance from 0 that all of `count` independent variables stay within with probability 1 -
+/// `alpha`: variables of Student's distribution with this many degrees of freedom, normal ones
+/// where they are infinite.
 pub fn critical_value(alpha: f64, count: f64, freedom: f64) -> f64 {
     let (mut lo, mut hi) = (0.0, 1.0);
     while sidak(two_sided(hi, freedom), count) > alpha && hi < 1e12 {

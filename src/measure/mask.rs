@@ -3,19 +3,22 @@
 use crate::error::{Error, Result};
 use crate::output::{Image, Samples};
 
-/// Values up to this are black where no surface is: frames in real time leave a few millionths beside edges, where alpha is 0.
+/// Values up to this are black where no surface is: frames in real time leave a few millionths
+/// beside edges, where alpha is 0.
 const MAX_BLACK: f32 = 1e-4;
 
 /// Which pixels are compared: those that meet all conditions.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskOptions {
-    /// Only pixels that at least one of the images covers, or in which one shows a background that is not black, if both have the channel `A`: equal black would flatter every
-    /// mean.
+    /// Only pixels that at least one of the images covers, or in which one shows a background that
+    /// is not black, if both have the channel `A`: equal black would flatter every mean.
     pub covered: bool,
-    /// Only pixels of this rectangle: left, top, width, height, in pixels from the upper left corner.
+    /// Only pixels of this rectangle: left, top, width, height, in pixels from the upper left
+    /// corner.
     pub rectangle: Option<[u32; 4]>,
-    /// Only pixels that show this instance: their `id.instance` (of the reference, or of the image if the reference has none).
+    /// Only pixels that show this instance: their `id.instance` (of the reference, or of the image
+    /// if the reference has none).
     pub instance: Option<u32>,
 }
 
@@ -35,11 +38,12 @@ impl Default for MaskOptions {
 }
 
 impl MaskOptions {
-    /// The pixels that are compared. Images have the same size. `colours`: the samples that are compared, where they are colours; an environment shows in them where no surface
-    /// does.
+    /// The pixels that are compared. Images have the same size. `colours`: the samples that are
+    /// compared, where they are colours; an environment shows in them where no surface does.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a rectangle that is not inside the image, and an instance where neither image has `id.instance`.
+    /// [`Error::Usage`] for a rectangle that is not inside the image, and an instance where neither
+    /// image has `id.instance`.
     pub fn select(&self, image: &Image, reference: &Image, colours: &[&[f32]]) -> Result<Mask> {
         let (width, height) = (image.width, image.height);
         let mut counted = vec![true; image.pixel_count()];
@@ -103,15 +107,15 @@ mod tests {
             ("A", Samples::F32(vec![0.0, 0.0, 1.0, 1.0, 1.0, 0.0])),
             ("id.instance", Samples::U32(vec![9, 7, 7, 8, 7, 9])),
         ]);
-        let of = |covered, rectangle, instance| {
+        let selected = |covered, rectangle, instance| {
             let mask = MaskOptions { covered, rectangle, instance };
             mask.select(&a, &b, &[]).unwrap().counted.iter().map(|c| *c as u8).collect::<Vec<_>>()
         };
-        assert_eq!(of(false, None, None), [1; 6]);
-        assert_eq!(of(true, None, None), [0, 1, 1, 1, 1, 0]);
-        assert_eq!(of(false, Some([1, 0, 2, 2]), None), [0, 1, 1, 0, 1, 1]);
-        assert_eq!(of(false, None, Some(7)), [0, 1, 1, 0, 1, 0]);
-        assert_eq!(of(true, Some([0, 1, 3, 1]), Some(7)), [0, 0, 0, 0, 1, 0]);
+        assert_eq!(selected(false, None, None), [1; 6]);
+        assert_eq!(selected(true, None, None), [0, 1, 1, 1, 1, 0]);
+        assert_eq!(selected(false, Some([1, 0, 2, 2]), None), [0, 1, 1, 0, 1, 1]);
+        assert_eq!(selected(false, None, Some(7)), [0, 1, 1, 0, 1, 0]);
+        assert_eq!(selected(true, Some([0, 1, 3, 1]), Some(7)), [0, 0, 0, 0, 1, 0]);
         for rectangle in [[0, 0, 0, 1], [2, 0, 2, 1], [0, 1, 1, 2], [u32::MAX, 0, u32::MAX, 1]] {
             assert!(MaskOptions { rectangle: Some(rectangle), ..Default::default() }.select(&a, &b, &[]).is_err());
         }

@@ -1,6 +1,7 @@
-//! Image metrics: `image` is compared with `reference`, both linear, over the pixels that `coverage` counts. A
-//! metric of a pair that holds a value that is not finite is NaN ([`ImagePair::non_finite`] counts them): invalid pixels must
-//! not be averaged away. A metric of no pixels is NaN too.
+//! Image metrics: `image` is compared with `reference`, both linear, over the pixels that
+//! `coverage` counts. A metric of a pair that holds a value that is not finite is NaN
+//! ([`ImagePair::non_finite`] counts them): invalid pixels must not be averaged away. A metric of
+//! no pixels is NaN too.
 
 use crate::{Error, Result};
 
@@ -17,8 +18,8 @@ pub struct ImagePair<'a> {
 }
 
 impl<'a> ImagePair<'a> {
-    /// `image` and `reference` are interleaved with the given number of channels. `coverage` has one value a pixel: those above
-    /// 0 count, `None` counts all.
+    /// `image` and `reference` are interleaved with the given number of channels. `coverage` has
+    /// one value a pixel: those above 0 count, `None` counts all.
     pub fn new(image: &'a [f32], reference: &'a [f32], channels: usize, coverage: Option<&'a [f32]>) -> Result<Self> {
         let wrong = |what: &str| Err(Error::Usage(format!("cannot compare images: {what}")));
         if channels == 0 || !image.len().is_multiple_of(channels) {
@@ -80,8 +81,8 @@ impl<'a> ImagePair<'a> {
         self.guarded(self.mean(|a, b| (a - b).abs()))
     }
 
-    /// Standard error of [`ImagePair::bias`], were pixels independent: the standard deviation of the pixels' mean differences over the root of their number. NaN for
-    /// fewer than two pixels.
+    /// Standard error of [`ImagePair::bias`], were pixels independent: the standard deviation of
+    /// the pixels' mean differences over the root of their number. NaN for fewer than two pixels.
     pub fn bias_standard_error(&self) -> f64 {
         let counts = |i: &usize| self.coverage.is_none_or(|c| c[*i] > 0.0);
         let pixel = |values: &[f32], i: usize| {
@@ -96,7 +97,8 @@ impl<'a> ImagePair<'a> {
         self.guarded((squares / (n - 1.0) / n).sqrt())
     }
 
-    /// Percentiles of the absolute difference, by linear interpolation between ranks, of `shares` from 0 to 1; NaN for no pixels.
+    /// Percentiles of the absolute difference, by linear interpolation between ranks, of `shares`
+    /// from 0 to 1; NaN for no pixels.
     pub fn percentiles<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
         let mut differences: Vec<f64> = self.values().map(|(a, b)| (a - b).abs()).collect();
         differences.sort_by(f64::total_cmp);
@@ -125,8 +127,8 @@ impl<'a> ImagePair<'a> {
         -10.0 * self.mse().log10()
     }
 
-    /// Mean of min(a/b, b/a) (Larsen 2019). Two zeros are alike and count 1 (there, 0); a zero against anything else counts 0, and
-    /// so do values of opposite sign.
+    /// Mean of min(a/b, b/a) (Larsen 2019). Two zeros are alike and count 1 (there, 0); a zero
+    /// against anything else counts 0, and so do values of opposite sign.
     pub fn minimum_ratio(&self) -> f64 {
         self.guarded(self.mean(|a, b| {
             if a == b {
@@ -139,7 +141,8 @@ impl<'a> ImagePair<'a> {
         }))
     }
 
-    /// The Tanimoto coefficient a.b / (|a|^2 + |b|^2 - a.b) of the images as vectors; 1 for two black images.
+    /// The Tanimoto coefficient a.b / (|a|^2 + |b|^2 - a.b) of the images as vectors; 1 for two
+    /// black images.
     pub fn tanimoto(&self) -> f64 {
         let (ab, aa, bb) = self.values().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (a, b)| (ab + a * b, aa + a * a, bb + b * b));
         let x = if aa == 0.0 && bb == 0.0 { 1.0 } else { ab / (aa + bb - ab) };
@@ -147,15 +150,16 @@ impl<'a> ImagePair<'a> {
     }
 }
 
-/// Coverage of the pixels that are below 250/255 in the first channel of either image: Larsen's mask against flattery by
-/// white pixels.
+/// Coverage of the pixels that are below 250/255 in the first channel of either image: Larsen's
+/// mask against flattery by white pixels.
 pub fn not_white(image: &[f32], reference: &[f32], channels: usize) -> Vec<f32> {
     let channels = channels.max(1);
     let limit = 250.0 / 255.0;
     image.chunks(channels).zip(reference.chunks(channels)).map(|(a, b)| (a[0] < limit || b[0] < limit) as u8 as f32).collect()
 }
 
-/// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 - exp(-radiance).
+/// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 -
+/// exp(-radiance).
 pub fn bad_pixels(image: &[f32], reference: &[f32]) -> f64 {
     let shown = |x: &f32| 1.0 - (-x).exp();
     let bad = image.chunks_exact(3).zip(reference.chunks_exact(3));

@@ -1,6 +1,10 @@
-//! Images or hits in, numbers out: [`comparison`] of two images by all metrics: those of pairs of values ([`metrics`]), [`ssim`], [`flip`] for how different they look, over the pixels of a [`mask`]; [`temporal`] for what of the past is
-//! left in a sequence of them, [`stale`] pixels that keep it, [`z_test`] for whether noise explains the difference, [`parity`] of two tracers over [`ray_sets`], [`agreement`] of the answers of two; [`stats`] of what
-//! was measured several times, [`regression`] for whether it has become worse, and [`displayed`] images against references that have an error of their own.
+//! Images or hits in, numbers out: [`comparison`] of two images by all metrics: those of pairs of
+//! values ([`metrics`]), [`ssim`], [`flip`] for how different they look, over the pixels of a
+//! [`mask`]; [`temporal`] for what of the past is left in a sequence of them, [`stale`] pixels that
+//! keep it, [`z_test`] for whether noise explains the difference, [`parity`] of two tracers over
+//! [`ray_sets`], [`agreement`] of the answers of two; [`stats`] of what was measured several times,
+//! [`regression`] for whether it has become worse, and [`displayed`] images against references that
+//! have an error of their own.
 
 pub mod agreement;
 pub mod comparison;

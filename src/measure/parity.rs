@@ -1,16 +1,20 @@
-//! Per-ray parity: does a single-precision tracer give the same hits as the double-precision oracle?
+//! Per-ray parity: does a single-precision tracer give the same hits as the double-precision
+//! oracle?
 //!
 //! Each ray is sorted into one of three classes.
 //!
-//! - **agree**: both miss, or both name the same instance and primitive and the tracer's `t` lies within the error bound of
-//!   [`crate::oracle::rounding`] around the true one.
-//! - **tie**: the answers differ, but the tracer's is one that exact arithmetic gives for data displaced by no more than
-//!   rounding. For a *closest hit*: the primitive it names is possibly hit at that `t`, and nothing is certainly hit before. For
-//!   a *miss* (and "not occluded"): nothing is certainly hit. For "occluded": something is possibly hit. That covers coincident
-//!   surfaces, shared edges and vertices, grazing rays, hits at `tmin` or `tmax`, and alpha at its cutoff.
+//! - **agree**: both miss, or both name the same instance and primitive and the tracer's `t` lies
+//!   within the error bound of [`crate::oracle::rounding`] around the true one.
+//! - **tie**: the answers differ, but the tracer's is one that exact arithmetic gives for data
+//!   displaced by no more than rounding. For a *closest hit*: the primitive it names is possibly
+//!   hit at that `t`, and nothing is certainly hit before. For a *miss* (and "not occluded"):
+//!   nothing is certainly hit. For "occluded": something is possibly hit. That covers coincident
+//!   surfaces, shared edges and vertices, grazing rays, hits at `tmin` or `tmax`, and alpha at its
+//!   cutoff.
 //! - **unexplained**: anything else. A defect of a tracer, or of this test.
 //!
-//! A tie is allowed to miss a closed mesh at a shared edge; [`super::ray_sets::leak_rays`] is the test that is not.
+//! A tie is allowed to miss a closed mesh at a shared edge; [`super::ray_sets::leak_rays`] is the
+//! test that is not.
 
 use crate::oracle::rounding::Rounding;
 use crate::oracle::{Oracle, OracleHit, OracleRay};
@@ -22,8 +26,8 @@ pub const MAX_EXAMPLES: usize = 8;
 
 /// Class of one ray; see the module's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The same answer.
+pub enum RayVerdict {
+    /// Both gave the same answer.
     Agree,
     /// Another answer that is within rounding.
     Tie,
@@ -38,7 +42,8 @@ pub struct Example {
     pub index: usize,
     /// The ray.
     pub ray: Ray,
-    /// The answer under judgement; for any-hit streams `t` is 0 for "occluded" and infinite otherwise.
+    /// The answer under judgement; for any-hit streams `t` is 0 for "occluded" and infinite
+    /// otherwise.
     pub answer: Hit,
     /// The answer it is compared with.
     pub reference: OracleHit,
@@ -51,7 +56,7 @@ pub struct Example {
 pub struct ParityReport {
     /// Rays judged.
     pub rays: u64,
-    /// Of these, rays that met something according to the reference.
+    /// Rays of these that met something according to the reference.
     pub hits: u64,
     /// Rays with the same answer.
     pub agree: u64,
@@ -145,13 +150,14 @@ pub fn is_admissible(oracle: &Oracle, ray: &OracleRay, hit: &Hit, rounding: Roun
 }
 
 /// Judges one closest hit against the true one.
-pub fn judge_closest_ray(oracle: &Oracle, ray: &Ray, hit: &Hit, truth: &OracleHit, rounding: Rounding) -> Verdict {
+pub fn judge_closest_ray(oracle: &Oracle, ray: &Ray, hit: &Hit, truth: &OracleHit, rounding: Rounding) -> RayVerdict {
     let wide = OracleRay::from(ray);
     let same = hit.instance == truth.instance && hit.primitive == truth.primitive;
     if !hit.is_hit() && !truth.is_hit() && !hit.t.is_nan() {
-        return Verdict::Agree;
+        return RayVerdict::Agree;
     }
-    // equal to a few roundings of t needs no error bound; else the bound around the true parameter decides
+    // equal to a few roundings of t needs no error bound; else the bound around the true parameter
+    // decides
     let t = hit.t as f64;
     if same && hit.is_hit() && truth.is_hit() {
         let holds = |x: f64, lo: f64, hi: f64| lo <= x && x <= hi;
@@ -160,25 +166,26 @@ pub fn judge_closest_ray(oracle: &Oracle, ray: &Ray, hit: &Hit, truth: &OracleHi
                 .candidates(&wide, hit.instance, hit.primitive, rounding)
                 .any(|c| holds(t, c.lo, c.hi) && holds(truth.t, c.lo, c.hi))
         {
-            return Verdict::Agree;
+            return RayVerdict::Agree;
         }
     }
     match is_admissible(oracle, &wide, hit, rounding) {
-        Ok(()) => Verdict::Tie,
-        Err(reason) => Verdict::Unexplained(reason),
+        Ok(()) => RayVerdict::Tie,
+        Err(reason) => RayVerdict::Unexplained(reason),
     }
 }
 
-/// Judges a tracer's closest hits. `truth` are the oracle's for the same rays ([`Oracle::trace_closest`]). Surplus entries of
-/// the longer slices are ignored.
+/// Judges a tracer's closest hits. `truth` are the oracle's for the same rays
+/// ([`Oracle::trace_closest`]). Surplus entries of the longer slices are ignored.
 pub fn judge_closest(oracle: &Oracle, rays: &[Ray], hits: &[Hit], truth: &[OracleHit], rounding: Rounding) -> ParityReport {
     report(rays.len().min(hits.len()).min(truth.len()), |i| {
         let verdict = judge_closest_ray(oracle, &rays[i], &hits[i], &truth[i], rounding);
-        (verdict, relative_difference(hits[i].t as f64, truth[i].t), Example::of(i, rays, hits[i], truth[i]))
+        (verdict, relative_difference(hits[i].t as f64, truth[i].t), Example::from_ray(i, rays, hits[i], truth[i]))
     })
 }
 
-/// Judges two tracers' closest hits against each other: answers that differ are ties when the oracle admits both.
+/// Judges two tracers' closest hits against each other: answers that differ are ties when the
+/// oracle admits both.
 pub fn judge_pair(oracle: &Oracle, rays: &[Ray], hits: &[Hit], others: &[Hit], rounding: Rounding) -> ParityReport {
     report(rays.len().min(hits.len()).min(others.len()), |i| {
         let (a, b) = (hits[i], others[i]);
@@ -186,49 +193,50 @@ pub fn judge_pair(oracle: &Oracle, rays: &[Ray], hits: &[Hit], others: &[Hit], r
             OracleHit { t: b.t as f64, instance: b.instance, primitive: b.primitive, barycentrics: [b.u as f64, b.v as f64] };
         let verdict = match judge_closest_ray(oracle, &rays[i], &a, &other, rounding) {
             // a tie only says that `a` is admissible
-            Verdict::Tie => match is_admissible(oracle, &OracleRay::from(&rays[i]), &b, rounding) {
-                Ok(()) => Verdict::Tie,
-                Err(_) => Verdict::Unexplained("the second tracer's answer is not admissible"),
+            RayVerdict::Tie => match is_admissible(oracle, &OracleRay::from(&rays[i]), &b, rounding) {
+                Ok(()) => RayVerdict::Tie,
+                Err(_) => RayVerdict::Unexplained("the second tracer's answer is not admissible"),
             },
             verdict => verdict,
         };
-        (verdict, relative_difference(a.t as f64, other.t), Example::of(i, rays, a, other))
+        (verdict, relative_difference(a.t as f64, other.t), Example::from_ray(i, rays, a, other))
     })
 }
 
-/// Judges a tracer's answers to "is anything in the way?". `truth` are the oracle's ([`Oracle::trace_any`]).
+/// Judges a tracer's answers to "is anything in the way?". `truth` are the oracle's
+/// ([`Oracle::trace_any`]).
 pub fn judge_any(oracle: &Oracle, rays: &[Ray], occluded: &[bool], truth: &[bool], rounding: Rounding) -> ParityReport {
     report(rays.len().min(occluded.len()).min(truth.len()), |i| {
         let verdict = if occluded[i] == truth[i] {
-            Verdict::Agree
+            RayVerdict::Agree
         } else {
             let ray = OracleRay::from(&rays[i]);
             if occluded[i] {
-                match oracle.possibly_any(&ray, rounding) {
-                    true => Verdict::Tie,
-                    false => Verdict::Unexplained("occluded where nothing is near"),
+                if oracle.possibly_any(&ray, rounding) {
+                    RayVerdict::Tie
+                } else {
+                    RayVerdict::Unexplained("occluded where nothing is near")
                 }
+            } else if oracle.certain_before(&ray, rounding).is_finite() {
+                RayVerdict::Unexplained("misses a primitive that it certainly hits")
             } else {
-                match oracle.certain_before(&ray, rounding).is_finite() {
-                    false => Verdict::Tie,
-                    true => Verdict::Unexplained("misses a primitive that it certainly hits"),
-                }
+                RayVerdict::Tie
             }
         };
         let answer = if occluded[i] { Hit { t: 0.0, ..Hit::MISS } } else { Hit::MISS };
         let reference = if truth[i] { OracleHit { t: 0.0, ..OracleHit::MISS } } else { OracleHit::MISS };
-        (verdict, 0.0, Example::of(i, rays, answer, reference))
+        (verdict, 0.0, Example::from_ray(i, rays, answer, reference))
     })
 }
 
-/// Judges the barycentric weights of a tracer's closest hits: they are those of the point where the ray meets the triangle that
-/// is named, or off by rounding. Rays that miss, and spheres, agree.
+/// Judges the barycentric weights of a tracer's closest hits: they are those of the point where the
+/// ray meets the triangle that is named, or off by rounding. Rays that miss, and spheres, agree.
 pub fn judge_weights(oracle: &Oracle, rays: &[Ray], hits: &[Hit], rounding: Rounding) -> ParityReport {
     report(rays.len().min(hits.len()), |i| {
         let hit = hits[i];
         let ray = OracleRay::from(&rays[i]);
         let mut reference = OracleHit { instance: hit.instance, primitive: hit.primitive, ..OracleHit::MISS };
-        let mut verdict = Verdict::Agree;
+        let mut verdict = RayVerdict::Agree;
         if hit.is_hit() {
             reference.t = hit.t as f64;
             if let Some((weights, errors)) = oracle.weights(&ray, hit.instance, hit.primitive, rounding) {
@@ -237,11 +245,11 @@ pub fn judge_weights(oracle: &Oracle, rays: &[Ray], hits: &[Hit], rounding: Roun
                 // what is not a number is near nothing
                 let near = (0..3).all(|k| (got[k] - weights[k]).abs() <= errors[k]);
                 if !near {
-                    verdict = Verdict::Unexplained("has the weights of another point");
+                    verdict = RayVerdict::Unexplained("has the weights of another point");
                 }
             }
         }
-        (verdict, 0.0, Example::of(i, rays, hit, reference))
+        (verdict, 0.0, Example::from_ray(i, rays, hit, reference))
     })
 }
 
@@ -250,12 +258,12 @@ fn relative_difference(t: f64, truth: f64) -> f64 {
 }
 
 impl Example {
-    fn of(index: usize, rays: &[Ray], answer: Hit, reference: OracleHit) -> Self {
+    fn from_ray(index: usize, rays: &[Ray], answer: Hit, reference: OracleHit) -> Self {
         Self { index, ray: rays[index], answer, reference, reason: "" }
     }
 }
 
-fn report(count: usize, judge: impl Fn(usize) -> (Verdict, f64, Example) + Sync) -> ParityReport {
+fn report(count: usize, judge: impl Fn(usize) -> (RayVerdict, f64, Example) + Sync) -> ParityReport {
     (0..count)
         .into_par_iter()
         .with_min_len(256)
@@ -264,12 +272,12 @@ fn report(count: usize, judge: impl Fn(usize) -> (Verdict, f64, Example) + Sync)
             report.rays += 1;
             report.hits += example.reference.is_hit() as u64;
             match verdict {
-                Verdict::Agree => {
+                RayVerdict::Agree => {
                     report.agree += 1;
                     report.worst_dt = report.worst_dt.max(dt);
                 }
-                Verdict::Tie => report.ties += 1,
-                Verdict::Unexplained(reason) => {
+                RayVerdict::Tie => report.ties += 1,
+                RayVerdict::Unexplained(reason) => {
                     report.unexplained += 1;
                     if report.examples.len() < MAX_EXAMPLES {
                         report.examples.push(Example { reason, ..example });

@@ -1,5 +1,5 @@
-//! Sets of rays on which tracers are compared. All are reproducible from their seed, rounded to `f32`, and relative to the
-//! oracle's origin.
+//! Sets of rays on which tracers are compared. All are reproducible from their seed, rounded to
+//! `f32`, and relative to the oracle's origin.
 
 use crate::oracle::camera::camera_ray;
 use crate::oracle::{Oracle, OracleHit, OracleRay};
@@ -38,8 +38,9 @@ pub fn narrow(ray: &OracleRay) -> Ray {
     }
 }
 
-/// `count` rays from points in and around the scene's bounds, half of them in any direction, half towards another point of the
-/// bounds. Directions have lengths between 1/4 and 4, and one ray in eight ends early, so that `t` is tested in its own units.
+/// `count` rays from points in and around the scene's bounds, half of them in any direction, half
+/// towards another point of the bounds. Directions have lengths between 1/4 and 4, and one ray in
+/// eight ends early, so that `t` is tested in its own units.
 pub fn random_rays(oracle: &Oracle, count: usize, seed: u32) -> Vec<Ray> {
     let Some((lo, hi)) = oracle.bounds() else { return Vec::new() };
     let size = (hi - lo).max(DVec3::splat((hi - lo).max_element() * 0.1));
@@ -73,8 +74,9 @@ pub fn camera_rays(oracle: &Oracle, camera: &Camera, size: [u32; 2], seed: u32) 
         .collect()
 }
 
-/// `per_hit` ambient occlusion rays of length `radius` from every hit of `rays`, cosine-distributed around the geometric normal
-/// on the viewer's side. They start 16 ulp of the greatest coordinate above the surface.
+/// `per_hit` ambient occlusion rays of length `radius` from every hit of `rays`, cosine-distributed
+/// around the geometric normal on the viewer's side. They start 16 ulp of the greatest coordinate
+/// above the surface.
 pub fn ao_rays(oracle: &Oracle, rays: &[Ray], hits: &[OracleHit], per_hit: u32, radius: f64, seed: u32) -> Vec<Ray> {
     let sampler = Sampler { seed };
     let count = rays.len().min(hits.len());
@@ -96,8 +98,8 @@ pub fn ao_rays(oracle: &Oracle, rays: &[Ray], hits: &[OracleHit], per_hit: u32, 
         .collect()
 }
 
-/// At least `total` rays of what renderers send: a third from `camera`, a third ambient occlusion rays of their hits, a third
-/// [`random_rays`].
+/// Generates at least `total` rays like those that renderers trace: a third from `camera`, a third
+/// ambient occlusion rays of their hits, a third [`random_rays`].
 pub fn mixed_rays(oracle: &Oracle, camera: &Camera, total: usize, seed: u32) -> Vec<Ray> {
     let edge = ((total / 3) as f64).sqrt().ceil() as u32;
     let mut rays = camera_rays(oracle, camera, [edge, edge], seed);
@@ -111,8 +113,9 @@ pub fn mixed_rays(oracle: &Oracle, camera: &Camera, total: usize, seed: u32) -> 
     rays
 }
 
-/// Scenes for [`leak_rays`], with what sets each apart: a box and a round body at scales of 1e-3 to 1e6 and at offsets to 1e6,
-/// in an instance's transform (from which the scene's origin takes it away) and in the vertices.
+/// Scenes for [`leak_rays`], with what sets each apart: a box and a round body at scales of 1e-3 to
+/// 1e6 and at offsets to 1e6, in an instance's transform (from which the scene's origin takes it
+/// away) and in the vertices.
 pub fn leak_scenes() -> Vec<(String, Scene)> {
     let mut out = Vec::new();
     for (scale, offset) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1e6, 0.0), (1.0, 1e6), (1e-3, 1.0), (1e3, -1e6)] {
@@ -128,7 +131,8 @@ pub fn leak_scenes() -> Vec<(String, Scene)> {
     out
 }
 
-/// Closed convex meshes beside [`leak_scenes`]: many triangles, needles (`segments` of them around a point), and nearly flat ones.
+/// Closed convex meshes beside [`leak_scenes`]: many triangles, needles (`segments` of them around
+/// a point), and nearly flat ones.
 pub fn hard_leak_scenes(levels: u32, segments: u32) -> Vec<(String, Scene)> {
     let body = |geometry: Geometry| {
         let mut scene = builtin::analytic::closed_box(1.0, SceneTransform::default());
@@ -150,14 +154,15 @@ pub fn hard_leak_scenes(levels: u32, segments: u32) -> Vec<(String, Scene)> {
     ]
 }
 
-/// Rays that must hit a closed convex mesh (or a union of them), aimed at its shared vertices and edges: even ones from inside,
-/// odd ones from outside. Every miss is a leak.
+/// Rays that must hit a closed convex mesh (or a union of them), aimed at its shared vertices and
+/// edges: even ones from inside, odd ones from outside. Every miss is a leak.
 ///
-/// A target is a vertex, the middle of an edge, or any point of an edge. One ray in four has an origin on a coarse binary grid,
-/// so that on tidy meshes the arithmetic is exact and the ray meets the edge exactly. The inner end lies well inside, so that
-/// no ray only grazes the mesh.
+/// A target is a vertex, the middle of an edge, or any point of an edge. One ray in four has an
+/// origin on a coarse binary grid, so that on tidy meshes the arithmetic is exact and the ray meets
+/// the edge exactly. The inner end lies well inside, so that no ray only grazes the mesh.
 pub fn leak_rays(oracle: &Oracle, count: usize, seed: u32) -> Vec<Ray> {
     let triangles = oracle.triangles();
+
     // middle of each instance's vertices: inside, for a convex mesh
     let mut middles = std::collections::HashMap::<u32, (DVec3, f64)>::new();
     for t in triangles {
@@ -178,6 +183,7 @@ pub fn leak_rays(oracle: &Oracle, count: usize, seed: u32) -> Vec<Ray> {
             let (a, b) = (triangle.v[corner], triangle.v[(corner + 1) % 3]);
             let along = [0.0, 0.5, random(seed, i, 2), random(seed, i, 3)][pick(4, 4)];
             let target = a + (b - a) * along;
+
             // half way to a random point of a random triangle at most: strictly inside
             let other = &triangles[pick(triangles.len(), 5)];
             let other = if other.instance == triangle.instance { other.v[pick(3, 6)] } else { target };
@@ -188,9 +194,12 @@ pub fn leak_rays(oracle: &Oracle, count: usize, seed: u32) -> Vec<Ray> {
                     inside = (inside / grid).round() * grid;
                 }
             }
+
+            // half of the rays go outwards, the others come from beyond the target
             let outward = target - inside;
             let origin = if i % 2 == 0 { inside } else { target + outward * (random(seed, i, 8) * 10.0 - 5.0).exp2() };
-            // the direction from the rounded origin, so that the ray passes the target but for its own rounding
+            // the direction from the rounded origin, so that the ray passes the target but for its
+            // own rounding
             let origin = origin.as_vec3().as_dvec3();
             narrow(&OracleRay { origin, direction: target - origin, tmin: 0.0, tmax: f64::INFINITY })
         })

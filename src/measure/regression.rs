@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     fn repeated(values: &[f64]) -> Values {
-        Values::Repeated(Percentiles::of(values).unwrap())
+        Values::Repeated(Percentiles::from_values(values).unwrap())
     }
 
     fn judgement(before: Values, now: Values) -> Judgement {

@@ -1,7 +1,9 @@
 //! SSIM: how much of the structure of one image the other has.
 //!
-//! After Wang, Bovik, Sheikh and Simoncelli, "Image quality assessment: from error visibility to structural similarity" (IEEE TIP 2004), with their
-//! window: a Gaussian of 1.5 pixels over 11x11 pixels, K1 = 0.01, K2 = 0.03, for values from 0 to 1. Colour images have the mean of their channels.
+//! After Wang, Bovik, Sheikh and Simoncelli, "Image quality assessment: from error visibility to
+//! structural similarity" (IEEE TIP 2004), with their window: a Gaussian of 1.5 pixels over 11x11
+//! pixels, K1 = 0.01, K2 = 0.03, for values from 0 to 1. Colour images have the mean of their
+//! channels.
 
 use rayon::prelude::*;
 
@@ -17,8 +19,9 @@ const STABILIZERS: [f64; 2] = [1e-4, 9e-4];
 /// Rows worked on at a time.
 const BAND: usize = 32;
 
-/// Mean SSIM over the pixels that count and whose window lies inside the image, -1 to 1; 1 for equal images. `None` where there is no such pixel. Values are those
-/// of a display, 0 to 1; those that are not finite are compared as 0. `width`: pixels in a row.
+/// Mean SSIM over the pixels that count and whose window lies inside the image, -1 to 1; 1 for
+/// equal images. `None` where there is no such pixel. Values are those of a display, 0 to 1; those
+/// that are not finite are compared as 0. `width`: pixels in a row.
 ///
 /// # Errors
 /// [`Error::Usage`] if the width does not divide the image.
@@ -33,7 +36,8 @@ pub fn ssim(pair: &ImagePair, width: usize) -> Result<Option<f64>> {
     }
     let window = window();
     let inner = height - 2 * RADIUS;
-    // (sum, number of values) of each band of rows: sums in the same order whatever the number of threads
+    // (sum, number of values) of each band of rows: sums in the same order whatever the number of
+    // threads
     let sums: Vec<(f64, u64)> = (0..inner.div_ceil(BAND))
         .into_par_iter()
         .map(|band| {

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// For serde: a number, or NaN for null. JSON has no numbers that are not finite, and writes them as null.
+/// For serde: a number, or NaN for null. JSON has no numbers that are not finite, and writes them
+/// as null.
 ///
 /// # Errors
 /// Those of the format.
@@ -10,7 +11,7 @@ pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, 
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
-/// The same for a list of numbers.
+/// For serde: a list of numbers, with NaN for each null.
 ///
 /// # Errors
 /// Those of the format.
@@ -35,7 +36,7 @@ pub struct Summary {
 
 impl Summary {
     /// Summarizes values; `None` for no values.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub fn from_values(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         let (min, max) = (*sorted.first()?, *sorted.last()?);
@@ -43,7 +44,8 @@ impl Summary {
     }
 }
 
-/// Median and percentiles of repeated measurements, in their unit. Percentiles are by nearest rank: values that occurred.
+/// Median and percentiles of repeated measurements, in their unit. Percentiles are by nearest rank:
+/// values that occurred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Percentiles {
     /// Middle value; the mean of the two in the middle of an even number.
@@ -66,7 +68,7 @@ pub struct Percentiles {
 
 impl Percentiles {
     /// Summarizes values; `None` for no values.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub fn from_values(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         let n = sorted.len();
@@ -74,9 +76,10 @@ impl Percentiles {
         Some(Self { p5: rank(5)?, p25: rank(25)?, median: middle(&sorted), p75: rank(75)?, p95: rank(95)?, count: n })
     }
 
-    /// Standard error of the median of independent values, estimated from the quartiles, which values far out do not move: for normally distributed
-    /// values the interquartile range is 1.349 standard deviations, and the median's standard error sqrt(pi / 2) times that of the mean. `None` for fewer
-    /// than two values, which tell nothing of it.
+    /// Standard error of the median of independent values, estimated from the quartiles, which
+    /// values far out do not move: for normally distributed values the interquartile range is 1.349
+    /// standard deviations, and the median's standard error sqrt(pi / 2) times that of the mean.
+    /// `None` for fewer than two values, which tell nothing of it.
     pub fn standard_error(&self) -> Option<f64> {
         let deviation = (self.p75 - self.p25) / 1.349;
         (self.count > 1).then(|| std::f64::consts::FRAC_PI_2.sqrt() * deviation / (self.count as f64).sqrt())
@@ -85,10 +88,11 @@ impl Percentiles {
 
 /// Median of some values; `None` for no values.
 pub fn median(values: &[f64]) -> Option<f64> {
-    Summary::of(values).map(|s| s.median)
+    Summary::from_values(values).map(|s| s.median)
 }
 
-/// The value below which a share of the values lies, by linear interpolation between ranks; `None` for no values. `share` from 0 to 1.
+/// The value below which a share of the values lies, by linear interpolation between ranks; `None`
+/// for no values. `share` from 0 to 1.
 pub fn percentile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -107,9 +111,10 @@ fn middle(sorted: &[f64]) -> f64 {
     if n % 2 == 1 { sorted[n / 2] } else { 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]) }
 }
 
-/// How much faster `seconds` are than `baseline`, entry `k` of both taken in the same round: the median of the rounds'
-/// quotients. A machine that slows down for a while slows both down, and the quotient stays. `None` when there is no round
-/// that both took part in. `work` and `baseline_work` are what a repeat did, in the same unit.
+/// How much faster `seconds` are than `baseline`, entry `k` of both taken in the same round: the
+/// median of the rounds' quotients. A machine that slows down for a while slows both down, and the
+/// quotient stays. `None` when there is no round that both took part in. `work` and `baseline_work`
+/// are what a repeat did, in the same unit.
 pub fn paired_ratio(seconds: &[f64], work: f64, baseline: &[f64], baseline_work: f64) -> Option<f64> {
     let ratios: Vec<f64> =
         seconds.iter().zip(baseline).map(|(s, b)| (work / s) / (baseline_work / b)).filter(|r| r.is_finite()).collect();
@@ -118,8 +123,9 @@ pub fn paired_ratio(seconds: &[f64], work: f64, baseline: &[f64], baseline_work:
 
 /// Does a rate fall faster than the logarithm of the size allows?
 ///
-/// A tracer that visits a constant number of nodes a level has rate proportional to 1 / log n. From points (n, rate), in any
-/// order, it takes `rate(n) * ln(n)`, relative to that of the smallest `n`: at least 1 where the rate falls no faster.
+/// A tracer that visits a constant number of nodes a level has rate proportional to 1 / log n. From
+/// points (n, rate), in any order, it takes `rate(n) * ln(n)`, relative to that of the smallest
+/// `n`: at least 1 where the rate falls no faster.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogScaling {
     /// The least of these relative products.
@@ -131,11 +137,13 @@ pub struct LogScaling {
 }
 
 impl LogScaling {
-    /// What counts as falling no faster than log n: rates vary by about this much from run to run.
+    /// Exponent within which a rate falls no faster than log n: rates vary by about this much from
+    /// run to run.
     pub const TOLERANCE: f64 = 0.1;
 
-    /// Of at least two points of different size, sizes above 1 and rates above 0; `None` otherwise.
-    pub fn of(points: &[(u64, f64)]) -> Option<Self> {
+    /// Fits at least two points of different size, sizes above 1 and rates above 0; `None`
+    /// otherwise.
+    pub fn from_points(points: &[(u64, f64)]) -> Option<Self> {
         let mut sorted = points.to_vec();
         sorted.sort_by_key(|p| p.0);
         let &(n0, r0) = sorted.first()?;
@@ -164,16 +172,16 @@ mod tests {
 
     #[test]
     fn medians() {
-        assert_eq!(Summary::of(&[]), None);
-        assert_eq!(Summary::of(&[3.0, 1.0, 2.0]), Some(Summary { median: 2.0, min: 1.0, max: 3.0 }));
+        assert_eq!(Summary::from_values(&[]), None);
+        assert_eq!(Summary::from_values(&[3.0, 1.0, 2.0]), Some(Summary { median: 2.0, min: 1.0, max: 3.0 }));
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[7.0]), Some(7.0));
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
         let of_hundred = Percentiles { median: 50.5, p95: 95.0, p5: 5.0, p25: 25.0, p75: 75.0, count: 100 };
-        assert_eq!(Percentiles::of(&hundred), Some(of_hundred));
+        assert_eq!(Percentiles::from_values(&hundred), Some(of_hundred));
         let of_two = Percentiles { median: 1.5, p95: 2.0, p5: 1.0, p25: 1.0, p75: 2.0, count: 2 };
-        assert_eq!(Percentiles::of(&[2.0, 1.0]), Some(of_two));
-        assert_eq!(Percentiles::of(&[]), None);
+        assert_eq!(Percentiles::from_values(&[2.0, 1.0]), Some(of_two));
+        assert_eq!(Percentiles::from_values(&[]), None);
         assert_eq!(percentile(&[], 0.95), None);
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));
@@ -184,8 +192,8 @@ mod tests {
         // normal quantiles: the standard deviation is 2
         let normal = Percentiles { median: 5.0, p25: 5.0 - 1.349, p75: 5.0 + 1.349, count: 100, ..Percentiles::default() };
         assert!((normal.standard_error().unwrap() - 1.2533 * 2.0 / 10.0).abs() < 1e-4);
-        assert_eq!(Percentiles::of(&[3.0]).unwrap().standard_error(), None);
-        assert_eq!(Percentiles::of(&[3.0, 3.0]).unwrap().standard_error(), Some(0.0));
+        assert_eq!(Percentiles::from_values(&[3.0]).unwrap().standard_error(), None);
+        assert_eq!(Percentiles::from_values(&[3.0, 3.0]).unwrap().standard_error(), Some(0.0));
     }
 
     #[test]
@@ -208,14 +216,14 @@ mod tests {
     fn logarithmic_rates_hold_and_steeper_ones_do_not() {
         let sizes = [10_000u64, 100_000, 1_000_000, 10_000_000];
         let rates = |f: &dyn Fn(f64) -> f64| sizes.iter().rev().map(|&n| (n, f(n as f64))).collect::<Vec<_>>();
-        let log = LogScaling::of(&rates(&|n| 80.0 / n.ln())).unwrap();
+        let log = LogScaling::from_points(&rates(&|n| 80.0 / n.ln())).unwrap();
         assert!(log.holds() && (log.worst - 1.0).abs() < 1e-12);
-        let flat = LogScaling::of(&rates(&|_| 5.0)).unwrap();
+        let flat = LogScaling::from_points(&rates(&|_| 5.0)).unwrap();
         assert!(flat.holds() && flat.exponent.abs() < 1e-12);
-        let root = LogScaling::of(&rates(&|n| 1e3 / n.sqrt())).unwrap();
+        let root = LogScaling::from_points(&rates(&|n| 1e3 / n.sqrt())).unwrap();
         assert!(!root.holds() && (root.exponent + 0.5).abs() < 1e-9 && root.worst_at == 10_000_000);
-        assert_eq!(LogScaling::of(&[(10, 1.0)]), None);
-        assert_eq!(LogScaling::of(&[(10, 1.0), (10, 2.0)]), None);
-        assert_eq!(LogScaling::of(&[(10, 1.0), (20, 0.0)]), None);
+        assert_eq!(LogScaling::from_points(&[(10, 1.0)]), None);
+        assert_eq!(LogScaling::from_points(&[(10, 1.0), (10, 2.0)]), None);
+        assert_eq!(LogScaling::from_points(&[(10, 1.0), (20, 0.0)]), None);
     }
 }

@@ -1,18 +1,26 @@
-//! Whether two noisy images show the same: a Z-test of each pixel, of tiles, and of the whole image's mean (Subr, Arvo 2007; Rousselle, Jarosz, Novak 2016).
+//! Whether two noisy images show the same: a Z-test of each pixel, of tiles, and of the whole
+//! image's mean (Subr, Arvo 2007; Rousselle, Jarosz, Novak 2016).
 //!
-//! [`Estimate`] is an image with the noise of its pixels, [`Region`] a part of one; the functions give scores, differences in standard errors. [`ZTest`]
-//! judges an image by them against a [`Reference`], with a stated rate of false alarms:
+//! [`Estimate`] is an image with the noise of its pixels, [`Region`] a part of one; the functions
+//! give scores, differences in standard errors. [`ZTest`] judges an image by them against a
+//! [`Reference`], with a stated rate of false alarms:
 //!
-//! - **pixels**: the difference over the standard error that the variances of samples give. The variance is the larger of the image's own and the
-//!   reference's: a pixel that has met a rare bright sample knows its noise, and one that has not is given that of the reference. So heavy tails make a
-//!   score smaller, not larger. Stratified samples do better than this error says, so pixels err on the side of silence.
-//! - **tiles** and the **mean**: the reference is a mean of renders with seeds of their own (*replicates*), which tell how far the mean over a tile moves
-//!   from seed to seed: with stratified samples a fraction of what variances of samples say, which is what makes a bias of half a percent visible. The
-//!   image is one more such render if nothing is wrong, so the difference over the replicates' standard deviation has Student's distribution. What
-//!   samples of a pixel scatter beyond what all replicates have seen there (a firefly, [`SURPRISE`]) is added to the variance.
+//! - **pixels**: the difference over the standard error that the variances of samples give. The
+//!   variance is the larger of the image's own and the reference's: a pixel that has met a rare
+//!   bright sample knows its noise, and one that has not is given that of the reference. So heavy
+//!   tails make a score smaller, not larger. Stratified samples do better than this error says, so
+//!   pixels err on the side of silence.
+//! - **tiles** and the **mean**: the reference is a mean of renders with seeds of their own
+//!   (*replicates*), which tell how far the mean over a tile moves from seed to seed: with
+//!   stratified samples a fraction of what variances of samples say, which is what makes a bias of
+//!   half a percent visible. The image is one more such render if nothing is wrong, so the
+//!   difference over the replicates' standard deviation has Student's distribution. What samples of
+//!   a pixel scatter beyond what all replicates have seen there (a firefly, [`SURPRISE`]) is added
+//!   to the variance.
 //!
-//! The probability that chance alone would give the largest score of each of the three is corrected for the number of scores, and the least of the three for
-//! their number (Sidak 1967). An alarm is a probability below the rate of false alarms.
+//! The probability that chance alone would give the largest score of each of the three is corrected
+//! for the number of scores, and the least of the three for their number (Sidak 1967). An alarm is
+//! a probability below the rate of false alarms.
 
 use super::distributions::{critical_value, sidak, two_sided};
 use crate::error::{Error, Result};
@@ -20,11 +28,13 @@ use crate::output::{Image, Samples};
 
 /// Side of a tile, pixels.
 pub const TILE: usize = 8;
-/// What may differ without noise, of a value: rounding of drivers.
+/// Share of a value that may differ without noise: rounding of drivers.
 pub const ROUNDING: f64 = 2e-4;
-/// A pixel whose samples scatter so many times the variance that is known of it has met what is rare.
+/// A pixel whose samples scatter so many times the variance that is known of it has met what is
+/// rare.
 pub const SURPRISE: f64 = 3.0;
-/// Standard errors by which a bias has to exceed the threshold to be detected with a probability of 99.9 %.
+/// Standard errors by which a bias has to exceed the threshold to be detected with a probability of
+/// 99.9 %.
 const POWER: f64 = 3.1;
 /// The least replicates from which a variance is estimated.
 pub const MIN_REPLICATES: u32 = 8;
@@ -44,7 +54,8 @@ pub struct Estimate {
     pub samples: Vec<f64>,
 }
 
-/// Names of the channels with values of an image that has variances: `Y`, or `R`, `G`, `B`; empty for others.
+/// Names of the channels with values of an image that has variances: `Y`, or `R`, `G`, `B`; empty
+/// for others.
 pub fn channels_with_variance(image: &Image) -> Vec<(&'static str, &'static str)> {
     const GREY: [(&str, &str); 1] = [("Y", "variance")];
     const COLOUR: [(&str, &str); 3] = [("R", "variance.R"), ("G", "variance.G"), ("B", "variance.B")];
@@ -53,11 +64,12 @@ pub fn channels_with_variance(image: &Image) -> Vec<(&'static str, &'static str)
 }
 
 impl Estimate {
-    /// The estimate of an image that holds means, variances of one sample, and numbers of samples, as stills do.
+    /// The estimate of an image that holds means, variances of one sample, and numbers of samples,
+    /// as stills do.
     ///
     /// # Errors
     /// [`Error::Usage`] for images without them, such as frames in real time.
-    pub fn of(image: &Image) -> Result<Self> {
+    pub fn from_image(image: &Image) -> Result<Self> {
         let names = channels_with_variance(image);
         let samples: Option<Vec<f64>> = image.channels.iter().find(|c| c.name == "samples").map(|c| match &c.samples {
             Samples::U32(n) => n.iter().map(|&n| f64::from(n)).collect(),
@@ -81,7 +93,8 @@ impl Estimate {
         self.means_over(&self.mean, &[Region::whole(self.size)])
     }
 
-    /// Means of values of this image over regions: a value for each region and channel, channels of a region together.
+    /// Means of values of this image over regions: a value for each region and channel, channels of
+    /// a region together.
     pub fn means_over(&self, values: &[f64], regions: &[Region]) -> Vec<f64> {
         let mut means = Vec::with_capacity(regions.len() * self.channels);
         for region in regions {
@@ -93,13 +106,14 @@ impl Estimate {
         means
     }
 
-    /// What rounding alone may make of each value: a share of it, or of the channel's mean where that is larger.
+    /// Difference that rounding alone may make of each value: a share of it, or of the channel's
+    /// mean where that is larger.
     pub fn rounding(&self, share: f64) -> Vec<f64> {
         let averages = self.averages();
         self.mean.iter().enumerate().map(|(k, m)| share * m.abs().max(averages[k % self.channels].abs())).collect()
     }
 
-    /// The same with the values of `other`, and its variances, where this one's are not finite.
+    /// Returns this estimate with the values and variances of `other` where its own are not finite.
     fn finite_or(&self, other: &Self) -> Self {
         let mut out = self.clone();
         for k in 0..out.mean.len() {
@@ -134,7 +148,8 @@ impl Region {
         Self { first: [0, 0], size }
     }
 
-    /// Squares of `side` pixels that cover an image, row by row; those at its right and lower edges may be smaller.
+    /// Squares of `side` pixels that cover an image, row by row; those at its right and lower edges
+    /// may be smaller.
     pub fn tiles(size: [usize; 2], side: usize) -> Vec<Self> {
         let [across, down] = size.map(|n| n.div_ceil(side));
         let tile = |x: usize, y: usize| Self {
@@ -156,7 +171,8 @@ impl Region {
     }
 }
 
-/// A difference in standard errors; `rounding` is a difference that is no error. 0 for no difference.
+/// A difference in standard errors; `rounding` is a difference that is no error. 0 for no
+/// difference.
 pub fn score(difference: f64, variance: f64, rounding: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / (variance + rounding * rounding).sqrt().max(f64::MIN_POSITIVE) }
 }
@@ -167,30 +183,32 @@ pub fn score(difference: f64, variance: f64, rounding: f64) -> f64 {
 /// [`Error::Usage`] for images of different sizes.
 pub fn pixel_scores(image: &Estimate, reference: &Estimate, rounding: &[f64]) -> Result<Vec<f64>> {
     image.check_like(reference)?;
-    let of = |k: usize| {
+    let value = |k: usize| {
         let p = k / image.channels;
         let known = image.variance[k].max(reference.variance[k]);
         let variance = known / image.samples[p].max(1.0) + reference.variance[k] / reference.samples[p].max(1.0);
         score(image.mean[k] - reference.mean[k], variance, rounding[k])
     };
-    Ok((0..image.mean.len()).map(of).collect())
+    Ok((0..image.mean.len()).map(value).collect())
 }
 
-/// The mean of several renders of an image that differ by their seeds alone, and how far they are apart.
+/// The mean of several renders of an image that differ by their seeds alone, and how far they are
+/// apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// The mean of all renders.
     pub estimate: Estimate,
     /// Number of renders.
     pub replicates: u32,
-    /// Variance of the mean over each of [`Region::tiles`] from render to render, channels of a tile together.
+    /// Variance of the mean over each of [`Region::tiles`] from render to render, channels of a
+    /// tile together.
     pub tiles: Vec<f64>,
     /// Variance of the mean over the image from render to render, of each channel.
     pub whole: Vec<f64>,
 }
 
 impl Reference {
-    /// From renders with seeds of their own and otherwise equal settings.
+    /// Creates a reference from renders with seeds of their own and otherwise equal settings.
     ///
     /// # Errors
     /// [`Error::Usage`] for fewer than [`MIN_REPLICATES`], or renders of different sizes.
@@ -220,7 +238,7 @@ impl Reference {
     }
 }
 
-/// What a [`ZTest`] looks at.
+/// Size of the regions that a [`ZTest`] looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
@@ -253,16 +271,18 @@ pub struct Extreme {
 
 /// The result of a Z-test.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Verdict {
+pub struct ZTestVerdict {
     /// The probability that chance alone makes the images differ so much.
     pub p: f64,
     /// Pixels, tiles and the mean.
     pub extremes: [Extreme; 3],
-    /// Mean of image - reference over that of the reference, of the channel for which it is largest in standard errors.
+    /// Mean of image - reference over that of the reference, of the channel for which it is largest
+    /// in standard errors.
     pub bias: f64,
     /// Standard error of `bias`.
     pub bias_error: f64,
-    /// The least bias of a channel's mean, as a share of it, that would be found with a probability of 99.9 %.
+    /// The least bias of a channel's mean, as a share of it, that would be found with a probability
+    /// of 99.9 %.
     pub detectable_bias: f64,
 }
 
@@ -275,7 +295,7 @@ pub struct ZTest {
 
 impl ZTest {
     /// Does the verdict say that images show the same?
-    pub fn holds(&self, verdict: &Verdict) -> bool {
+    pub fn holds(&self, verdict: &ZTestVerdict) -> bool {
         verdict.p >= self.false_alarms
     }
 
@@ -283,7 +303,7 @@ impl ZTest {
     ///
     /// # Errors
     /// [`Error::Usage`] for images of different sizes.
-    pub fn compare(&self, image: &Estimate, reference: &Reference) -> Result<Verdict> {
+    pub fn compare(&self, image: &Estimate, reference: &Reference) -> Result<ZTestVerdict> {
         let known = &reference.estimate;
         image.check_like(known)?;
         let image = &image.finite_or(known);
@@ -315,7 +335,7 @@ impl ZTest {
         let needed = critical_value(self.false_alarms, 3.0 * known.channels as f64, freedom) + POWER;
         let averages = known.averages();
         let detectable = averages.iter().zip(&errors).map(|(a, e)| needed * e / a.abs().max(f64::MIN_POSITIVE));
-        Ok(Verdict {
+        Ok(ZTestVerdict {
             p: sidak(least, 3.0),
             extremes,
             bias: share(mean.difference),
@@ -340,11 +360,12 @@ fn extreme(
     Extreme { scale, score, p, at, channel: worst % channels, difference, reference }
 }
 
-/// The variance of each mean of an image that its reference knows nothing of: of pixels whose samples scatter [`SURPRISE`] times as much as the reference's.
+/// The variance of each mean of an image that its reference knows nothing of: of pixels whose
+/// samples scatter [`SURPRISE`] times as much as the reference's.
 fn surplus(image: &Estimate, known: &Estimate) -> Vec<f64> {
-    let of = |k: usize| {
+    let value = |k: usize| {
         let (own, before) = (image.variance[k], known.variance[k]);
         if own > SURPRISE * before { (own - before) / image.samples[k / image.channels].max(1.0) } else { 0.0 }
     };
-    (0..image.mean.len()).map(of).collect()
+    (0..image.mean.len()).map(value).collect()
 }

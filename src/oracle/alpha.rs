@@ -1,4 +1,5 @@
-//! Alpha of a surface, as the shaders compute it: base colour alpha x texture alpha x vertex colour alpha, against a cutoff.
+//! Alpha of a surface, as the shaders compute it: base colour alpha x texture alpha x vertex colour
+//! alpha, against a cutoff.
 
 use crate::scene::{AlphaMode, Filter, Geometry, Mesh, Scene, TexelData, Texture, Wrap};
 use glam::{Affine2, DVec2, Vec2};
@@ -59,12 +60,14 @@ impl AlphaTest {
         Some(test)
     }
 
-    /// Is the surface opaque at this point of the triangle? `barycentrics` weigh the second and third corner.
+    /// Is the surface opaque at this point of the triangle? `barycentrics` weigh the second and
+    /// third corner.
     pub fn is_present(&self, primitive: u32, barycentrics: [f64; 2]) -> bool {
         self.alpha(primitive, barycentrics) >= self.cutoff
     }
 
-    /// Alpha at this point of the triangle. Missing texture coordinates are (0, 0), missing vertex colours opaque.
+    /// Alpha at this point of the triangle. Missing texture coordinates are (0, 0), missing vertex
+    /// colours opaque.
     pub fn alpha(&self, primitive: u32, barycentrics: [f64; 2]) -> f64 {
         let (vertex, uv) = self.interpolate(primitive, barycentrics);
         let texture = self.texture.as_ref().map_or(1.0, |(t, _)| texture_alpha(t, texels(t, uv)));
@@ -78,7 +81,8 @@ impl AlphaTest {
         let (mut lo, mut hi) = (1.0f64, 1.0f64);
         if let Some((texture, transform)) = &self.texture {
             let size = DVec2::new(texture.width as f64, texture.height as f64);
-            // coordinates are f32: a few roundings of their own size, and the weights' errors times the corners' differences
+            // coordinates are f32: a few roundings of their own size, and the weights' errors times
+            // the corners' differences
             let at = |k: usize| transform.transform_point2(self.texcoord(corners[k])).as_dvec2();
             let mut reach = uv.abs() * 8.0 * f32::EPSILON as f64;
             for (k, e) in error.barycentric.iter().enumerate() {

@@ -1,8 +1,10 @@
 //! Ambient occlusion on the CPU in double precision: the ground truth for images.
 //!
-//! Ambient visibility is one minus the cosine-weighted occlusion, `A(p) = 1 - 1/pi * integral over the hemisphere of f(d) cos dw`,
-//! with `d` the distance to the nearest hit and `f(d) = c^-d` (1 for any hit within the radius when `c` is 1), around the
-//! geometric normal on the viewer's side, as in pbrt-v4's `AOIntegrator`. Points come from the same [`Sampler`] as the shaders'.
+//! Ambient visibility is one minus the cosine-weighted occlusion,
+//! `A(p) = 1 - 1/pi * integral over the hemisphere of f(d) cos dw`, with `d` the distance to the
+//! nearest hit and `f(d) = c^-d` (1 for any hit within the radius when `c` is 1), around the
+//! geometric normal on the viewer's side, as in pbrt-v4's `AOIntegrator`. Points come from the same
+//! [`Sampler`] as the shaders'.
 
 use super::camera::camera_ray;
 use super::{Oracle, OracleRay};
@@ -33,8 +35,9 @@ impl AoSettings {
     }
 }
 
-/// Occlusion along one ray from `point` into the unit direction `direction`. It starts 1e-11 of the greatest coordinate above
-/// the surface: well above rounding in double precision, far below anything that shows.
+/// Occlusion along one ray from `point` into the unit direction `direction`. It starts 1e-11 of the
+/// greatest coordinate above the surface: well above rounding in double precision, far below
+/// anything that shows.
 pub fn ray_occlusion(oracle: &Oracle, point: DVec3, normal: DVec3, direction: DVec3, settings: &AoSettings) -> f64 {
     let reach = oracle.bounds().map_or(0.0, |(lo, hi)| (hi - lo).max_element().max(point.abs().max_element()));
     let ray = OracleRay { origin: point + normal * (1e-11 * reach), direction, tmin: 0.0, tmax: settings.radius };
@@ -46,12 +49,13 @@ pub fn ray_occlusion(oracle: &Oracle, point: DVec3, normal: DVec3, direction: DV
 pub struct Estimate {
     /// Mean of the samples.
     pub mean: f64,
-    /// Standard error of the mean, as if samples were independent: an upper bound for stratified ones.
+    /// Standard error of the mean, as if samples were independent: an upper bound for stratified
+    /// ones.
     pub standard_error: f64,
 }
 
-/// Ambient visibility of `point` (relative to the oracle's origin) around the unit vector `normal`, from `samples` rays. `pixel`
-/// chooses the point set.
+/// Ambient visibility of `point` (relative to the oracle's origin) around the unit vector `normal`,
+/// from `samples` rays. `pixel` chooses the point set.
 pub fn ambient_visibility(
     oracle: &Oracle,
     point: DVec3,
@@ -87,7 +91,8 @@ pub fn ao_direction(sampler: Sampler, pixel: [u32; 2], index: u32, normal: DVec3
 pub struct AoImage {
     /// Width and height.
     pub size: [u32; 2],
-    /// Mean ambient visibility of the samples that hit a surface; 0 where none did. Rows from the top.
+    /// Mean ambient visibility of the samples that hit a surface; 0 where none did. Rows from the
+    /// top.
     pub ambient_visibility: Vec<f32>,
     /// Share of the samples that hit a surface, in [0, 1].
     pub coverage: Vec<f32>,

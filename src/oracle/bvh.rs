@@ -6,7 +6,8 @@ use std::ops::ControlFlow;
 
 const BINS: usize = 16;
 const LEAF: usize = 4;
-/// Below this depth nodes are halved by count: together with 2^32 primitives at most that bounds the traversal stack.
+/// Below this depth nodes are halved by count: together with 2^32 primitives at most that bounds
+/// the traversal stack.
 const HEURISTIC_DEPTH: u32 = 64;
 const STACK: usize = HEURISTIC_DEPTH as usize + 34;
 
@@ -14,7 +15,8 @@ const STACK: usize = HEURISTIC_DEPTH as usize + 34;
 struct Node {
     lo: DVec3,
     hi: DVec3,
-    /// Leaf: first entry of `order`. Inner: index of the second child; the first follows its parent.
+    /// Leaf: first entry of `order`. Inner: index of the second child; the first follows its
+    /// parent.
     next: u32,
     /// Primitives of a leaf; 0 for an inner node.
     count: u32,
@@ -41,7 +43,8 @@ fn half_area((lo, hi): Box3) -> f64 {
 }
 
 impl Bvh {
-    /// Builds the tree. Boxes that are not finite are skipped, because no ray hits their primitives.
+    /// Builds the tree. Boxes that are not finite are skipped, because no ray hits their
+    /// primitives.
     pub(super) fn build(boxes: &[Box3]) -> Self {
         let finite = |b: &Box3| b.0.is_finite() && b.1.is_finite();
         let order: Vec<u32> = (0u32..).zip(boxes).filter(|(_, b)| finite(b)).map(|(i, _)| i).collect();
@@ -80,11 +83,13 @@ impl Bvh {
         self.split(boxes, first + middle, end, depth + 1);
     }
 
-    /// Calls `visit` for every primitive whose box, widened by `pad`, the ray meets within `(tmin, limit)`; `visit` returns a
-    /// parameter beyond which nothing matters any more.
+    /// Calls `visit` for every primitive whose box, widened by `pad`, the ray meets within
+    /// `(tmin, limit)`; `visit` returns a parameter beyond which nothing matters any more.
     pub(super) fn visit(&self, ray: &OracleRay, pad: f64, limit: f64, mut visit: impl FnMut(u32) -> ControlFlow<(), f64>) {
+        // the entry of a box, and whether the ray meets it before the limit
         let inverse = ray.direction.recip();
-        // NaN (a zero direction component on the slab's plane) is ignored by min and max: the slab does not limit the ray
+        // NaN (a zero direction component on the slab's plane) is ignored by min and max: the slab
+        // does not limit the ray
         let enter = |n: &Node, limit: f64| -> Option<f64> {
             let (mut near, mut far) = (ray.tmin, limit);
             for k in 0..3 {
@@ -95,6 +100,8 @@ impl Bvh {
             }
             (near <= far).then_some(near)
         };
+
+        // depth first from the root, nearer children first
         let mut limit = limit;
         let mut stack = [(0u32, 0.0f64); STACK];
         let mut depth = 0;
@@ -120,6 +127,8 @@ impl Bvh {
                 }
                 continue;
             }
+
+            // the far child is pushed below the near one
             let (first, second) = (index + 1, node.next);
             let a = enter(&self.nodes[first as usize], limit).map(|t| (first, t));
             let b = enter(&self.nodes[second as usize], limit).map(|t| (second, t));

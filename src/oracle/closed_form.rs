@@ -1,9 +1,10 @@
-//! Analytic ambient visibility (1 - cosine-weighted occlusion) of simple scenes, in closed form or by one-dimensional
-//! quadrature.
+//! Analytic ambient visibility (1 - cosine-weighted occlusion) of simple scenes, in closed form or
+//! by one-dimensional quadrature.
 //!
-//! Lengths are in scene units, angles in radians. For binary occlusion, cosine-weighted occlusion is the form factor from a
-//! point to what occludes (Howell, "A Catalog of Radiation Heat Transfer Configuration Factors"). With falloff, `c` is the base
-//! of `c^-d`, at least 1; 1 is binary. Everything is tested against Monte Carlo integration by the oracle.
+//! Lengths are in scene units, angles in radians. For binary occlusion, cosine-weighted occlusion
+//! is the form factor from a point to what occludes (Howell, "A Catalog of Radiation Heat Transfer
+//! Configuration Factors"). With falloff, `c` is the base of `c^-d`, at least 1; 1 is binary.
+//! Everything is tested against Monte Carlo integration by the oracle.
 
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -18,19 +19,22 @@ pub fn closed_box() -> f64 {
     0.0
 }
 
-/// A point on a wall of an infinite V-groove that opens by `angle`: (1 - cos angle) / 2, at any distance from the bottom.
+/// A point on a wall of an infinite V-groove that opens by `angle`: (1 - cos angle) / 2, at any
+/// distance from the bottom.
 ///
-/// In the plane across the groove the other wall covers the directions from the bottom of the groove (angle 0 above the wall)
-/// to those parallel to the other wall (angle pi - `angle`), and the form factor to an infinite strip between two such angles
-/// is half the difference of their cosines (Hottel): (1 + cos angle) / 2.
+/// In the plane across the groove the other wall covers the directions from the bottom of the
+/// groove (angle 0 above the wall) to those parallel to the other wall (angle pi - `angle`), and
+/// the form factor to an infinite strip between two such angles is half the difference of their
+/// cosines (Hottel): (1 + cos angle) / 2.
 pub fn v_groove(angle: f64) -> f64 {
     if angle >= PI { 1.0 } else { (1.0 - angle.cos()) / 2.0 }
 }
 
-/// A point of a wall of a finite V-groove: at `distance` from the bottom, `along` its middle; the other wall is `length` long
-/// and `width` wide (along the groove).
+/// A point of a wall of a finite V-groove: at `distance` from the bottom, `along` its middle; the
+/// other wall is `length` long and `width` wide (along the groove).
 pub fn v_groove_finite(angle: f64, distance: f64, along: f64, length: f64, width: f64) -> f64 {
-    // this wall is the plane y = 0, the bottom of the groove the z axis, the point at (distance, 0, along)
+    // this wall is the plane y = 0, the bottom of the groove the z axis, the point at (distance, 0,
+    // along)
     let slope = DVec3::new(angle.cos(), angle.sin(), 0.0) * length;
     let (a, b) = (DVec3::Z * (-0.5 * width), DVec3::Z * (0.5 * width));
     let wall = [a, b, b + slope, a + slope];
@@ -39,9 +43,10 @@ pub fn v_groove_finite(angle: f64, distance: f64, along: f64, length: f64, width
 
 /// A point of a wall of an infinite V-groove with falloff, at `distance` from the bottom.
 ///
-/// In cylindrical coordinates around the groove's direction, at angle `phi` above the wall and elevation `beta` out of the
-/// cross-section, the other wall is at `rho(phi) / cos(beta)`. The integral over `beta` is the Bickley-Naylor function Ki_3,
-/// which leaves 2/pi * integral of sin(phi) Ki_3(rho ln c) over phi.
+/// In cylindrical coordinates around the groove's direction, at angle `phi` above the wall and
+/// elevation `beta` out of the cross-section, the other wall is at `rho(phi) / cos(beta)`. The
+/// integral over `beta` is the Bickley-Naylor function Ki_3, which leaves 2/pi * integral of
+/// sin(phi) Ki_3(rho ln c) over phi.
 pub fn v_groove_falloff(angle: f64, distance: f64, c: f64) -> f64 {
     if angle >= PI {
         return 1.0;
@@ -61,14 +66,16 @@ pub fn bickley_3(x: f64) -> f64 {
     })
 }
 
-/// A point of a plane at `rho` from the foot of a sphere whose centre is `height` above the plane: 1 - r^2 h / (rho^2 + h^2)^1.5.
-/// `None` unless the sphere is wholly above the plane, where the formula holds.
+/// A point of a plane at `rho` from the foot of a sphere whose centre is `height` above the plane:
+/// 1 - r^2 h / (rho^2 + h^2)^1.5. `None` unless the sphere is wholly above the plane, where the
+/// formula holds.
 pub fn sphere_over_plane(radius: f64, height: f64, rho: f64) -> Option<f64> {
     (height >= radius).then(|| 1.0 - radius * radius * height / (rho * rho + height * height).powf(1.5))
 }
 
-/// The point of a plane straight below a sphere, with falloff. Quadrature over the angle from the normal; the sphere is met at
-/// h cos - sqrt(r^2 - h^2 sin^2). `None` unless the sphere is wholly above the plane.
+/// The point of a plane straight below a sphere, with falloff. Quadrature over the angle from the
+/// normal; the sphere is met at h cos - sqrt(r^2 - h^2 sin^2). `None` unless the sphere is wholly
+/// above the plane.
 pub fn sphere_over_plane_falloff(radius: f64, height: f64, c: f64) -> Option<f64> {
     (height >= radius).then(|| {
         // theta = widest * sin(x): removes the root's singularity at the rim
@@ -83,8 +90,9 @@ pub fn sphere_over_plane_falloff(radius: f64, height: f64, c: f64) -> Option<f64
     })
 }
 
-/// A point of a plane `gap` below a parallel rectangle that spans `[x0, x1]` by `[y0, y1]` relative to the point's
-/// perpendicular: the classic form factor to a rectangle's corner, four times with signs.
+/// A point of a plane `gap` below a parallel rectangle that spans `[x0, x1]` by `[y0, y1]` relative
+/// to the point's perpendicular: the classic form factor to a rectangle's corner, four times with
+/// signs.
 pub fn parallel_rectangle(gap: f64, [x0, x1]: [f64; 2], [y0, y1]: [f64; 2]) -> f64 {
     let corner = |x: f64, y: f64| {
         let (x, y) = (x / gap, y / gap);
@@ -94,11 +102,12 @@ pub fn parallel_rectangle(gap: f64, [x0, x1]: [f64; 2], [y0, y1]: [f64; 2]) -> f
     1.0 - (corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0))
 }
 
-/// A point of a plane `gap` below the middle of a parallel disk (of infinite radius: a parallel plane), with falloff and an
-/// occlusion radius. Binary and unlimited it is gap^2 / (gap^2 + disk^2).
+/// A point of a plane `gap` below the middle of a parallel disk (of infinite radius: a parallel
+/// plane), with falloff and an occlusion radius. Binary and unlimited it is gap^2 / (gap^2 +
+/// disk^2).
 ///
-/// With the cosine `mu` from the normal the disk is met at `gap / mu`: 1 - 2 * integral of mu c^(-gap / mu) over the cosines at
-/// which the disk lies within its rim and within the radius.
+/// With the cosine `mu` from the normal the disk is met at `gap / mu`: 1 - 2 * integral of mu
+/// c^(-gap / mu) over the cosines at which the disk lies within its rim and within the radius.
 pub fn parallel_disk(gap: f64, disk: f64, c: f64, radius: f64) -> f64 {
     let least = (gap / gap.hypot(disk)).max(gap / radius);
     if least >= 1.0 {
@@ -110,8 +119,9 @@ pub fn parallel_disk(gap: f64, disk: f64, c: f64, radius: f64) -> f64 {
     1.0 - 2.0 * integrate(least, 1.0, 400, |mu| mu * c.powf(-gap / mu))
 }
 
-/// Form factor from a point with unit normal `normal` to a planar convex polygon, either side: the share of cosine-weighted
-/// directions that meet it. Lambert's formula (Baum et al. 1989), after clipping the polygon at the horizon.
+/// Form factor from a point with unit normal `normal` to a planar convex polygon, either side: the
+/// share of cosine-weighted directions that meet it. Lambert's formula (Baum et al. 1989), after
+/// clipping the polygon at the horizon.
 pub fn polygon_form_factor(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let corners: Vec<DVec3> = polygon.iter().map(|p| *p - point).collect();
     let mut above = Vec::with_capacity(corners.len() + 1);

@@ -1,8 +1,9 @@
 //! The oracle: a CPU tracer in double precision, and closed-form solutions of ambient occlusion.
 //!
-//! [`Oracle`] answers every ray twice, by testing all primitives and by a BVH, with the same result; tests compare both with
-//! each other and every other tracer with them. [`rounding`] decides which answers of a single-precision tracer are within
-//! its rounding; [`closed_form`] and [`ao`] are references for ambient occlusion itself.
+//! [`Oracle`] answers every ray twice, by testing all primitives and by a BVH, with the same
+//! result; tests compare both with each other and every other tracer with them. [`rounding`]
+//! decides which answers of a single-precision tracer are within its rounding; [`closed_form`] and
+//! [`ao`] are references for ambient occlusion itself.
 //!
 //! The code is kept simple rather than fast, so that its correctness is easy to verify.
 
@@ -85,15 +86,17 @@ impl OracleHit {
     }
 }
 
-/// Range of an instance's primitives in the oracle's numbering, and the error bounds of its transform.
+/// Range of an instance's primitives in the oracle's numbering, and the error bounds of its
+/// transform.
 #[derive(Clone, Debug)]
 struct OracleInstance {
     first: u32,
     count: u32,
     /// Alpha test of its mesh; `None` for opaque materials.
     alpha: Option<Arc<AlphaTest>>,
-    /// Bound on how much a round trip to object space amplifies rounding: Frobenius norms of the matrix and its inverse,
-    /// scaled to 1 for rotations and uniform scales; infinite for a singular matrix.
+    /// Bound on how much a round trip to object space amplifies rounding: Frobenius norms of the
+    /// matrix and its inverse, scaled to 1 for rotations and uniform scales; infinite for a
+    /// singular matrix.
     condition: f64,
     /// Length of the translation relative to the oracle's origin.
     translation: f64,
@@ -113,12 +116,15 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    /// The scene as seen from `origin` (usually [`Scene::origin`]): every `f32` vertex is placed in `f64`, minus `origin`.
-    /// Instances with a broken transform or mesh index contribute nothing.
+    /// The scene as seen from `origin` (usually [`Scene::origin`]): every `f32` vertex is placed in
+    /// `f64`, minus `origin`. Instances with a broken transform or mesh index contribute nothing.
     pub fn new(scene: &Scene, origin: DVec3) -> Self {
         let (mut triangles, mut spheres, mut instances) = (Vec::new(), Vec::new(), Vec::new());
+
         // one alpha test per mesh, shared by its instances
         let tests: Vec<_> = scene.meshes.iter().map(|mesh| AlphaTest::new(scene, mesh).map(Arc::new)).collect();
+
+        // primitives in world space, around the origin, in double precision
         for (id, instance) in (0u32..).zip(&scene.instances) {
             let mut to_world = instance.object_to_world;
             to_world.translation -= origin;
@@ -159,11 +165,15 @@ impl Oracle {
             }
             instances.push(entry);
         }
+
+        // spheres are numbered after all triangles
         for (entry, instance) in instances.iter_mut().zip(&scene.instances) {
             if matches!(scene.meshes.get(instance.mesh).map(|m| &m.geometry), Some(Geometry::Spheres(_))) {
                 entry.first += triangles.len() as u32;
             }
         }
+
+        // one BVH over both
         let bounds: Vec<_> =
             triangles.iter().map(Triangle::bounds).chain(spheres.iter().map(SpherePrimitive::bounds)).collect();
         let bvh = Bvh::build(&bounds);
@@ -196,7 +206,8 @@ impl Oracle {
         &self.spheres
     }
 
-    /// The nearest hit. Of several at the same parameter the one with the lowest instance and primitive wins, triangles first.
+    /// The nearest hit. Of several at the same parameter the one with the lowest instance and
+    /// primitive wins, triangles first.
     pub fn closest(&self, ray: impl Into<OracleRay>) -> OracleHit {
         let ray = ray.into();
         let mut best = (OracleHit::MISS, u32::MAX);
@@ -255,8 +266,8 @@ impl Oracle {
         rays.par_iter().with_min_len(256).map(|r| self.any(r)).collect()
     }
 
-    /// The geometric normal at a hit, of unit length, on the side that `direction` comes from. Zero for a miss and for a
-    /// triangle without area.
+    /// The geometric normal at a hit, of unit length, on the side that `direction` comes from. Zero
+    /// for a miss and for a triangle without area.
     pub fn facing_normal(&self, ray: &OracleRay, hit: &OracleHit) -> DVec3 {
         let Some(index) = self.index_of(hit.instance, hit.primitive) else { return DVec3::ZERO };
         let n = match self.triangles.get(index as usize) {
@@ -305,7 +316,8 @@ impl Oracle {
         }
     }
 
-    /// Widening of boxes in traversal, which covers [`primitive::RESIDUAL`] and the rounding of the slab test.
+    /// Widening of boxes in traversal, which covers [`primitive::RESIDUAL`] and the rounding of the
+    /// slab test.
     fn pad(&self, ray: &OracleRay) -> f64 {
         4.0 * primitive::RESIDUAL * (self.extent + ray.origin.abs().max_element())
     }

@@ -3,9 +3,10 @@
 use super::OracleRay;
 use glam::{DAffine3, DVec3};
 
-/// Hits are accepted whose point on the primitive lies within this share of the distance to its farthest vertex from the ray.
-/// Only a ray that lies in the triangle's plane to about six digits can fail it: its hit point is rounding noise, and the
-/// traversal of boxes could not promise to find it.
+/// Hits are accepted whose point on the primitive lies within this share of the distance to its
+/// farthest vertex from the ray. Only a ray that lies in the triangle's plane to about six digits
+/// can fail it: its hit point is rounding noise, and the traversal of boxes could not promise to
+/// find it.
 pub const RESIDUAL: f64 = 1e-10;
 
 /// A triangle in world space, relative to the oracle's origin. Both faces count.
@@ -32,11 +33,13 @@ impl Triangle {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Parameter and barycentric weights of the second and third corner, for the whole line; `None` when it passes outside.
+    /// Parameter and barycentric weights of the second and third corner, for the whole line; `None`
+    /// when it passes outside.
     ///
-    /// The test of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013: corners are sheared into a
-    /// space where the ray is the z axis. Two triangles that share an edge compute the same magnitude for it with opposite
-    /// sign, bit for bit, and zero counts as inside: a ray cannot pass between them.
+    /// The test of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013:
+    /// corners are sheared into a space where the ray is the z axis. Two triangles that share an
+    /// edge compute the same magnitude for it with opposite sign, bit for bit, and zero counts as
+    /// inside: a ray cannot pass between them.
     pub fn intersect(&self, ray: &OracleRay) -> Option<(f64, [f64; 2])> {
         let d = ray.direction;
         let z = d.abs().max_position();
@@ -70,7 +73,7 @@ pub struct SpherePrimitive {
     pub radius: f64,
     /// Object space to world relative to the oracle's origin.
     pub object_to_world: DAffine3,
-    /// Its inverse.
+    /// Inverse of `object_to_world`.
     pub world_to_object: DAffine3,
     /// Index into [`crate::scene::Scene::instances`].
     pub instance: u32,
@@ -79,7 +82,8 @@ pub struct SpherePrimitive {
 }
 
 impl SpherePrimitive {
-    /// `(min, max)` in the world: the extent of an ellipsoid along an axis is the length of the matrix's row.
+    /// `(min, max)` in the world: the extent of an ellipsoid along an axis is the length of the
+    /// matrix's row.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let rows = self.object_to_world.matrix3.transpose();
         let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length()) * self.radius;
@@ -98,7 +102,8 @@ impl SpherePrimitive {
         let from = self.world_to_object.transform_point3(ray.origin) - self.center;
         let d = self.world_to_object.transform_vector3(ray.direction);
         let (a, b) = (d.length_squared(), from.dot(d));
-        // the discriminant from the perpendicular: no cancellation for far rays (Haines et al., Ray Tracing Gems, ch. 7)
+        // the discriminant from the perpendicular: no cancellation for far rays (Haines et al., Ray
+        // Tracing Gems, ch. 7)
         let discriminant = self.radius * self.radius - (from - d * (b / a)).length_squared();
         if discriminant.is_nan() || discriminant < 0.0 {
             return None;

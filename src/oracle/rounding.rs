@@ -1,34 +1,41 @@
 //! Decides which answers of a single-precision tracer are within its rounding error.
 //!
-//! **Error model.** A tracer in `f32` is taken to answer exactly, but for slightly wrong data (backward error analysis, Higham
-//! 2002): every vertex and the ray's line may be displaced by
+//! **Error model.** A tracer in `f32` is taken to answer exactly, but for slightly wrong data
+//! (backward error analysis, Higham 2002): every vertex and the ray's line may be displaced by
 //!
 //! ```text
 //! delta = ulps * 2^-23 * k * (|o| + max|v| + |T|)      (lengths are Euclidean)
 //! ```
 //!
-//! `o` is the ray's origin and `v` the primitive's vertices, relative to the tracer's zero: rounding a coordinate, or a
-//! difference of two, errs in proportion to the coordinate. Where an instance's transform is applied to the ray, its
-//! translation `T` is another such coordinate, and going to object space and back amplifies the error by the condition number
-//! `k` of the matrix (1 for rotation and uniform scale). `ulps` (16) covers the chain: two transforms of three products each,
-//! subtraction, shear, and the products of the edge functions, each at most a few halves of an ulp. An error of the
-//! direction in proportion to `2^-23` moves the line at distance `s` by `s * 2^-23`, and `s <= |o| + max|v|`.
+//! `o` is the ray's origin and `v` the primitive's vertices, relative to the tracer's zero:
+//! rounding a coordinate, or a difference of two, errs in proportion to the coordinate. Where an
+//! instance's transform is applied to the ray, its translation `T` is another such coordinate, and
+//! going to object space and back amplifies the error by the condition number `k` of the matrix (1
+//! for rotation and uniform scale). `ulps` (16) covers the chain: two transforms of three products
+//! each, subtraction, shear, and the products of the edge functions, each at most a few halves of
+//! an ulp. An error of the direction in proportion to `2^-23` moves the line at distance `s` by
+//! `s * 2^-23`, and `s <= |o| + max|v|`.
 //!
 //! **Consequences**, all in double precision. Seen along the ray,
-//! - a line that passes the boundary of a triangle (or the silhouette of a sphere) at more than `delta` certainly meets or
-//!   misses it; nearer, it may do either: edges and vertices that triangles share, cracks between coincident ones, grazing
-//!   rays, whose triangles appear as slivers;
-//! - the parameter of a hit errs by at most `delta / (|d| cos)`, with `cos` between ray and normal, plus its own rounding, and
-//!   never leaves the primitive's extent along the ray by more than `delta`;
-//! - a triangle's edge functions are differences of products of corners' distances from the ray, which round in proportion to
-//!   those (pbrt-v4, 6.8.7, `delta_e`). That moves a weight by `4 * 2^-23 * |p| |q| / area`, with `p` and `q` the ends of the edge seen
-//!   along the ray: next to nothing, but for slivers, whose weights, and with them the parameter between the corners', are worth
-//!   less than their corners. Signs are never wrong for it, so it makes nothing uncertain;
+//! - a line that passes the boundary of a triangle (or the silhouette of a sphere) at more than
+//!   `delta` certainly meets or misses it; nearer, it may do either: edges and vertices that
+//!   triangles share, cracks between coincident ones, grazing rays, whose triangles appear as
+//!   slivers;
+//! - the parameter of a hit errs by at most `delta / (|d| cos)`, with `cos` between ray and normal,
+//!   plus its own rounding, and never leaves the primitive's extent along the ray by more than
+//!   `delta`;
+//! - a triangle's edge functions are differences of products of corners' distances from the ray,
+//!   which round in proportion to those (pbrt-v4, 6.8.7, `delta_e`). That moves a weight by
+//!   `4 * 2^-23 * |p| |q| / area`, with `p` and `q` the ends of the edge seen along the ray: next
+//!   to nothing, but for slivers, whose weights, and with them the parameter between the corners',
+//!   are worth less than their corners. Signs are never wrong for it, so it makes nothing
+//!   uncertain;
 //! - where that interval contains `tmin` or `tmax`, the hit may count or not;
-//! - where alpha crosses the cutoff within the error of the texture coordinates (and of a texture unit: 1/256 texel, 1/255 of
-//!   the value), the surface may exist or not.
+//! - where alpha crosses the cutoff within the error of the texture coordinates (and of a texture
+//!   unit: 1/256 texel, 1/255 of the value), the surface may exist or not.
 //!
-//! So each primitive is *certainly hit*, *possibly hit* or *certainly missed*, over an interval of parameters.
+//! So each primitive is *certainly hit*, *possibly hit* or *certainly missed*, over an interval of
+//! parameters.
 
 use super::alpha::AlphaUncertainty;
 use super::primitive::{SpherePrimitive, Triangle};
@@ -78,8 +85,8 @@ impl Candidate {
 }
 
 impl Oracle {
-    /// The hits with one primitive that a tracer may report for this ray (a sphere has two), or none when the primitive is
-    /// certainly missed or does not exist.
+    /// The hits with one primitive that a tracer may report for this ray (a sphere has two), or
+    /// none when the primitive is certainly missed or does not exist.
     pub fn candidates(
         &self,
         ray: &OracleRay,
@@ -122,9 +129,10 @@ impl Oracle {
         found
     }
 
-    /// Barycentric weights of the three corners where the ray meets a triangle (or passes it most closely), and by how much each
-    /// may be off, in a tracer's hit: a displacement of `delta` changes a weight by `delta` over the height that the triangle
-    /// shows along the ray. `None` for a sphere and for what does not exist.
+    /// Barycentric weights of the three corners where the ray meets a triangle (or passes it most
+    /// closely), and by how much each may be off, in a tracer's hit: a displacement of `delta`
+    /// changes a weight by `delta` over the height that the triangle shows along the ray. `None`
+    /// for a sphere and for what does not exist.
     pub fn weights(&self, ray: &OracleRay, instance: u32, primitive: u32, rounding: Rounding) -> Option<([f64; 3], [f64; 3])> {
         let triangle = self.triangles.get(self.index_of(instance, primitive)? as usize)?;
         let (delta, flat) = self.as_seen(triangle, ray, rounding);
@@ -134,7 +142,8 @@ impl Oracle {
         Some(([1.0 - v - w, v, w], weight_errors(&flat, delta).map(|e| e + own)))
     }
 
-    /// The model's `delta` for a triangle, and its corners seen along the ray: relative to the ray's line, across it.
+    /// The model's `delta` for a triangle, and its corners seen along the ray: relative to the
+    /// ray's line, across it.
     fn as_seen(&self, triangle: &Triangle, ray: &OracleRay, rounding: Rounding) -> (f64, [DVec3; 3]) {
         let instance = &self.instances[triangle.instance as usize];
         let farthest = triangle.v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
@@ -156,6 +165,8 @@ impl Oracle {
 
     fn triangle_candidate(&self, triangle: &Triangle, ray: &OracleRay, rounding: Rounding) -> Candidate {
         let instance = &self.instances[triangle.instance as usize];
+
+        // the triangle as the ray sees it, and how far rounding may move its corners
         let (delta, flat) = self.as_seen(triangle, ray, rounding);
         let length = ray.direction.length();
         let d = ray.direction / length;
@@ -166,7 +177,9 @@ impl Oracle {
         if inside.is_none() && (to_boundary > delta || to_boundary.is_nan()) {
             return Candidate::NEVER;
         }
-        // the interval of t by the plane, cut to the triangle's own extent (which alone holds where the plane is edge-on)
+
+        // the interval of t by the plane, cut to the triangle's own extent (which alone holds where
+        // the plane is edge-on)
         let normal = triangle.normal();
         let cos = normal.dot(d).abs();
         let t_plane = inside.map_or_else(|| normal.dot(corners[0]) / normal.dot(ray.direction), |(t, _)| t);
@@ -181,8 +194,12 @@ impl Oracle {
             // the line passes the triangle outside: a reported hit can be anywhere on it
             (lo, hi) = (first, last);
         }
+
+        // the reported parameter is rounded, too
         let rounded = 4.0 * f32::EPSILON as f64;
         (lo, hi) = (lo - rounded * lo.abs(), hi + rounded * hi.abs());
+
+        // rounding of texture coordinates may change the alpha test
         let mut certain = inside.is_some() && to_boundary > delta;
         if let Some(alpha) = &instance.alpha {
             let weights = inside.map_or_else(|| clamped_barycentrics(&flat), |(_, b)| b);
@@ -236,8 +253,8 @@ fn distance_to_segment(a: DVec3, b: DVec3) -> f64 {
     if t.is_nan() { a.length() } else { (a + edge * t).length() }
 }
 
-/// By how much a displacement of `delta` changes the weight of each corner: `delta` over the height that the triangle shows;
-/// and the rounding of the edge functions' products besides.
+/// Change of each corner's weight by a displacement of `delta`: `delta` over the height that the
+/// triangle shows; and the rounding of the edge functions' products besides.
 fn weight_errors(flat: &[DVec3; 3], delta: f64) -> [f64; 3] {
     let area = (flat[1] - flat[0]).cross(flat[2] - flat[0]).length();
     let products = product_errors(flat);
@@ -245,8 +262,8 @@ fn weight_errors(flat: &[DVec3; 3], delta: f64) -> [f64; 3] {
     [0, 1, 2].map(|k| (2.0 * delta * (flat[(k + 1) % 3] - flat[(k + 2) % 3]).length() / area + products[k]).min(1.0))
 }
 
-/// By how much the products of the edge functions move each corner's weight. All weights are divided by the sum of the three,
-/// which errs as they do.
+/// Change of each corner's weight by the products of the edge functions. All weights are divided by
+/// the sum of the three, which errs as they do.
 fn product_errors(flat: &[DVec3; 3]) -> [f64; 3] {
     let area = (flat[1] - flat[0]).cross(flat[2] - flat[0]).length();
     let lengths = flat.map(|p| p.length());

@@ -195,7 +195,7 @@ mod tests {
         assert!(few.contains("61x43 pixels"), "{few}");
         of(&Budget::default(), |max| MaxSize { side: 60, ..max });
         // before anything is decoded
-        let budget = Budget::of(61 * 43 * 8 - 1);
+        let budget = Budget::with_limit(61 * 43 * 8 - 1);
         of(&budget, |max| max);
         assert!(budget.check().unwrap_err().to_string().contains("an image of 61x43 pixels takes"));
     }

@@ -435,7 +435,7 @@ impl FramesReport {
         let mut out = Vec::new();
         for label in labels {
             let ms: Vec<f64> = self.frames[from..].iter().filter_map(|f| of(label, &f.stats.timings)).collect();
-            if let (Some(s), Some(p95)) = (Summary::of(&ms), percentile(&ms, 0.95)) {
+            if let (Some(s), Some(p95)) = (Summary::from_values(&ms), percentile(&ms, 0.95)) {
                 out.push((label, s.median, p95));
             }
         }
@@ -450,7 +450,7 @@ impl FramesReport {
         let first = of(&mut self.frames.iter().filter(|f| !f.is_skipped()));
         let all = of(&mut self.frames[from..].iter());
         let ms = [worked, first, all].into_iter().find(|ms| !ms.is_empty()).unwrap_or_default();
-        (Summary::of(&ms).map_or(0.0, |s| s.median), percentile(&ms, 0.95).unwrap_or(0.0))
+        (Summary::from_values(&ms).map_or(0.0, |s| s.median), percentile(&ms, 0.95).unwrap_or(0.0))
     }
 
     /// How long frames take, in a line.

@@ -1,23 +1,28 @@
-//! Importance sampling of an environment map by luminance, interpolated bilinearly between texels as in the shader
-//! (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
+//! Importance sampling of an environment map by luminance, interpolated bilinearly between texels
+//! as in the shader (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in
+//! Mitsuba 3 and pbrt-v4 (A.5).
 //!
-//! Patches lie between the centers of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
-//! are halves. A row is sampled by its weight, then a patch of the row by its own, both by inversion. The remainder of each number
-//! then samples the bilinear function within the patch, which preserves stratification.
+//! Patches lie between the centers of texels: `width` columns (the last one wraps round) and
+//! `height + 1` rows, of which those at the poles are halves. A row is sampled by its weight, then
+//! a patch of the row by its own, both by inversion. The remainder of each number then samples the
+//! bilinear function within the patch, which preserves stratification.
 
 use rayon::prelude::*;
 
 /// Cumulative distribution of the rows, and of the patches in each row.
 #[derive(Clone, Debug, Default)]
 pub struct BilinearDistribution {
-    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. An interval that
-    /// single precision rounds to zero length is never sampled: its density is 0.
+    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches
+    /// begin, `width` of them, and 1. An interval that single precision rounds to zero length is
+    /// never sampled: its density is 0.
     pub table: Vec<f32>,
 }
 
 impl BilinearDistribution {
-    /// Builds the distribution of texel values, finite and not negative: `texels(y, out)` writes the `width` values of row `y`, rows from the pole at +y. It is asked for each row
-    /// twice, by several threads: values that are cheap to compute need not be kept, of which a map of 16384x8192 texels has a gigabyte.
+    /// Builds the distribution of texel values, finite and not negative: `texels(y, out)` writes
+    /// the `width` values of row `y`, rows from the pole at +y. It is asked for each row twice, by
+    /// several threads: values that are cheap to compute need not be kept, of which a map of
+    /// 16384x8192 texels has a gigabyte.
     pub fn new(width: usize, height: usize, texels: impl Fn(usize, &mut [f64]) + Sync) -> Self {
         let mut table = vec![0.0; height + 2 + (height + 1) * (width + 1)];
         let (starts, columns) = table.split_at_mut(height + 2);
@@ -85,7 +90,8 @@ mod tests {
         values[w + 3] = 1.0;
         let patches = BilinearDistribution::new(w, h, |y, out| out.copy_from_slice(&values[y * w..][..w]));
         let rows = widths(&patches.table[..h + 2]);
-        // rows of patches above and below the middle one of three rows of texels, and none at the poles
+        // rows of patches above and below the middle one of three rows of texels, and none at the
+        // poles
         assert_eq!((rows[0], rows[3]), (0.0, 0.0));
         assert!((rows[1] - 0.5).abs() < 1e-6 && (rows[2] - 0.5).abs() < 1e-6);
         for row in [1, 2] {

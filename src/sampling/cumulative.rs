@@ -1,11 +1,14 @@
-//! Sampling of a discrete distribution by inversion of its cumulative distribution. Unlike an alias table it preserves the order of the
-//! outcomes: neighbouring numbers choose neighbouring outcomes, and the remainder of a number is again uniform and stratified. So one
-//! stratified sample can choose an outcome and then a point of it (pbrt-v4, A.1, `SampleDiscrete`).
+//! Sampling of a discrete distribution by inversion of its cumulative distribution. Unlike an alias
+//! table it preserves the order of the outcomes: neighbouring numbers choose neighbouring outcomes,
+//! and the remainder of a number is again uniform and stratified. So one stratified sample can
+//! choose an outcome and then a point of it (pbrt-v4, A.1, `SampleDiscrete`).
 
-/// A discrete distribution over outcomes `0..n`, in units of 2^-32: sampling matches the probabilities exactly.
+/// A discrete distribution over outcomes `0..n`, in units of 2^-32: sampling matches the
+/// probabilities exactly.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CumulativeTable {
-    /// `n + 1` numbers: outcome `k` is chosen from `starts[k]` up to `starts[k + 1]`. The last is 2^32, which wraps to 0.
+    /// `n + 1` numbers: outcome `k` is chosen from `starts[k]` up to `starts[k + 1]`. The last is
+    /// 2^32, which wraps to 0.
     pub starts: Vec<u32>,
     /// Probability of each outcome.
     pub probabilities: Vec<f32>,

@@ -1,9 +1,11 @@
 //! Random and quasi-random numbers, and their mapping to directions.
 //!
-//! [`sobol`] generates points in integer arithmetic only: the shaders have the same functions, and both give the same bits.
-//! [`cumulative`] samples a discrete distribution, [`bilinear`] an environment map; [`sequence`] has the sequences of the real-time
-//! renderer. [`morton`] numbers pixels in Morton order. [`best_candidates`] and [`blue_noise`] make the tables of the `larsen` preset.
-//! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, as the shaders compute them, line by line.
+//! [`sobol`] generates points in integer arithmetic only: the shaders have the same functions, and
+//! both give the same bits. [`cumulative`] samples a discrete distribution, [`bilinear`] an
+//! environment map; [`sequence`] has the sequences of the real-time renderer. [`morton`] numbers
+//! pixels in Morton order. [`best_candidates`] and [`blue_noise`] make the tables of the `larsen`
+//! preset. [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, as the
+//! shaders compute them, line by line.
 
 pub mod bilinear;
 pub mod cumulative;

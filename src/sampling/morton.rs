@@ -1,6 +1,7 @@
 //! Morton order, the same as shaders/common/morton.glsl.
 
-/// Interleaves the lower 16 bits of the coordinates: pixels of aligned squares of 2^k follow each other.
+/// Interleaves the lower 16 bits of the coordinates: pixels of aligned squares of 2^k follow each
+/// other.
 pub fn morton(pixel: [u32; 2]) -> u32 {
     let spread = |x: u32| {
         let x = x & 0xffff;

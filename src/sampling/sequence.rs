@@ -1,5 +1,5 @@
-//! Sample sequences for real-time rendering with few samples per frame: how the error is distributed over pixels and frames
-//! decides how much of it a spatio-temporal filter removes.
+//! Sample sequences for real-time rendering with few samples per frame: how the error is
+//! distributed over pixels and frames decides how much of it a spatio-temporal filter removes.
 //!
 //! Integer arithmetic: shaders/common/sequence.glsl has the same functions, equal bit for bit.
 
@@ -12,8 +12,8 @@ use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d,
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
 impl Sequence {
-    /// Convergence exponent e beyond that of random sampling: the variance of the mean of n samples of a smooth function falls as
-    /// n^-(1 + e). Measured (docs/realtime.md).
+    /// Convergence exponent e beyond that of random sampling: the variance of the mean of n samples
+    /// of a smooth function falls as n^-(1 + e). Measured (docs/realtime.md).
     pub fn evenness(self) -> f32 {
         match self {
             Sequence::Sobol => 0.375,
@@ -22,7 +22,8 @@ impl Sequence {
         }
     }
 
-    /// Sample `index` of the `count` that `pixel` takes in a frame, as fractions of 2^32. The sequence continues from frame to frame.
+    /// Sample `index` of the `count` that `pixel` takes in a frame, as fractions of 2^32. The
+    /// sequence continues from frame to frame.
     pub fn get_2d(self, seed: u32, pixel: [u32; 2], frame: u32, index: u32, count: u32) -> [u32; 2] {
         let n = frame.wrapping_mul(count).wrapping_add(index);
         let step = |p: [u32; 2], n: u32| std::array::from_fn(|k| p[k].wrapping_add(n.wrapping_mul(R2_STEP[k])));
@@ -81,7 +82,8 @@ mod tests {
                 assert_eq!(counts(four, 4), ones);
             }
         }
-        // an aligned square of four by four pixels, in the first frame; later ones are shifted and stay as even
+        // an aligned square of four by four pixels, in the first frame; later ones are shifted and
+        // stay as even
         for corner in [[0, 0], [8, 4], [640, 352]] {
             let square =
                 |frame| (0..16u32).map(move |k| Sequence::Blue.get_2d(1, [corner[0] + k % 4, corner[1] + k / 4], frame, 0, 1));

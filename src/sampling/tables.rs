@@ -2,9 +2,9 @@
 
 use super::sobol::{hash_combine, to_unit};
 
-/// `count` points of the unit square by Mitchell's best candidate, in the order in which they were found: each is the farthest from
-/// all before it (on the torus) of ten times as many random ones as there are points. "Spectrally Optimal Sampling for Distribution
-/// Ray Tracing", SIGGRAPH 1991.
+/// `count` points of the unit square by Mitchell's best candidate, in the order in which they were
+/// found: each is the farthest from all before it (on the torus) of ten times as many random ones
+/// as there are points. "Spectrally Optimal Sampling for Distribution Ray Tracing", SIGGRAPH 1991.
 pub fn best_candidates(count: usize, seed: u32) -> Vec<[f32; 2]> {
     let mut next = 0u32;
     let mut random = || {
@@ -34,12 +34,14 @@ fn torus_distance2(a: [f32; 2], b: [f32; 2]) -> f32 {
     d(0) * d(0) + d(1) * d(1)
 }
 
-/// A tile of `side` x `side` values in [0, 1), each of a different rank, whose neighbours differ much: Ulichney, "The
-/// Void-and-Cluster Method for Dither Array Generation", SPIE 1913, 1993. `side` is a multiple of 8.
+/// A tile of `side` x `side` values in [0, 1), each of a different rank, whose neighbours differ
+/// much: Ulichney, "The Void-and-Cluster Method for Dither Array Generation", SPIE 1913, 1993.
+/// `side` is a multiple of 8.
 pub fn blue_noise(side: usize, seed: u32) -> Vec<f32> {
     let n = side * side;
     let mut field = Field::new(side);
-    // a tenth of the pixels, at random; then tightest clusters change places with largest voids until they are the same
+    // a tenth of the pixels, at random; then tightest clusters change places with largest voids
+    // until they are the same
     let mut k = 0;
     while field.ones < n / 10 {
         let at = hash_combine(seed, k) as usize % n;

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// Linear sRGB of a black body of a temperature in kelvin, of luminance 1. Primaries that sRGB cannot show are cut off at 0: below about 1900 K
-/// blue is.
+/// Linear sRGB of a black body of a temperature in kelvin, of luminance 1. Primaries that sRGB
+/// cannot show are cut off at 0: below about 1900 K blue is.
 pub fn blackbody(kelvin: f64) -> Vec3 {
     let xyz = blackbody_xyz(kelvin);
     // IEC 61966-2-1
@@ -28,7 +28,8 @@ fn planck(nanometres: f64, kelvin: f64) -> f64 {
     (nanometres / 560.0).powi(-5) / (C2 / (nanometres * kelvin)).exp_m1()
 }
 
-/// Colour matching functions of the CIE 1931 standard observer (2 degrees), x, y and z, every 5 nm from 380 nm to 780 nm (CIE 15:2004, table T.4).
+/// Colour matching functions of the CIE 1931 standard observer (2 degrees), x, y and z, every 5 nm
+/// from 380 nm to 780 nm (CIE 15:2004, table T.4).
 #[rustfmt::skip]
 const MATCHING: [[f64; 3]; 81] = [
     [0.001368, 0.000039, 0.00645],

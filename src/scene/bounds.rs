@@ -1,7 +1,8 @@
 //! Bounds of a scene: those of its vertices and spheres, however instances turn them.
 //!
-//! The box around a mesh's box is too large where an instance turns it, by up to the square root of three along each axis. So such instances count by their vertices, but only those
-//! whose box reaches beyond what is known: few of a million.
+//! The box around a mesh's box is too large where an instance turns it, by up to the square root of
+//! three along each axis. So such instances count by their vertices, but only those whose box
+//! reaches beyond what is known: few of a million.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -15,11 +16,13 @@ use super::{Geometry, Instance, Scene, Sphere, TriangleMesh};
 const BLOCK: usize = 8192;
 /// Number of instances that are looked at one after the other, for each raises what is known.
 const FURTHEST: usize = 256;
-/// Number of instances of a mesh whose vertices are all looked at, before a hierarchy is built of them.
+/// Number of instances of a mesh whose vertices are all looked at, before a hierarchy is built of
+/// them.
 const LOOKED_AT: usize = 16;
 /// Maximum number of points below a node of that hierarchy.
 const LEAF: usize = 32;
-/// Share of a box's extent along an axis of the world below which it does not count that the box is turned: exporters' rotations by quarter turns have such numbers for zeros.
+/// Share of a box's extent along an axis of the world below which it does not count that the box is
+/// turned: exporters' rotations by quarter turns have such numbers for zeros.
 const ROUNDING: f64 = 1e-9;
 
 /// The greatest x, y and z, and the greatest -x, -y and -z.
@@ -43,9 +46,10 @@ pub(super) fn of_scene(scene: &Scene) -> Option<(DVec3, DVec3)> {
         let placed = PlacedBox::new(shape, &i.object_to_world);
         let boxed = std::array::from_fn(|k| if placed.is_turned[k % 3] { f64::NEG_INFINITY } else { placed.extremes[k] });
         let known = union(known, boxed);
-        match placed.is_turned.contains(&true) {
-            true => (shape.touching().iter().map(|p| shape.extremes_of(p, &i.object_to_world)).fold(known, union), true),
-            false => (known, is_turned),
+        if placed.is_turned.contains(&true) {
+            (shape.touching().iter().map(|p| shape.extremes_of(p, &i.object_to_world)).fold(known, union), true)
+        } else {
+            (known, is_turned)
         }
     };
     let none = || (NOTHING, false);
@@ -54,7 +58,8 @@ pub(super) fn of_scene(scene: &Scene) -> Option<(DVec3, DVec3)> {
         return bounds(known);
     }
 
-    // The turned instances that may reach beyond it, the furthest first: after those the others hardly do.
+    // The turned instances that may reach beyond it, the furthest first: after those the others
+    // hardly do.
     let excess = |i: &Instance| {
         let Some(shape) = shape_of(i) else { return 0.0 };
         let placed = PlacedBox::new(shape, &i.object_to_world);
@@ -88,7 +93,7 @@ fn row(to_world: &DAffine3, k: usize) -> DVec3 {
     if k < 3 { row } else { -row }
 }
 
-/// What is added to a product with a [`row`].
+/// Offset that is added to a product with a [`row`].
 fn offset(to_world: &DAffine3, k: usize) -> f64 {
     if k < 3 { to_world.translation[k] } else { -to_world.translation[k - 3] }
 }
@@ -221,7 +226,8 @@ impl<'a> Shape<'a> {
     }
 }
 
-/// The extremes of all vertices, if triangles use those that are extreme: one look at the vertices and one at the indices, in the order of memory.
+/// The extremes of all vertices, if triangles use those that are extreme: one look at the vertices
+/// and one at the indices, in the order of memory.
 fn extremes_of_triangles(t: &TriangleMesh, to_world: &DAffine3) -> Option<Extremes> {
     type Found = [(f64, usize); 6];
     let further = |mut a: Found, b: Found| {
@@ -246,10 +252,12 @@ fn extremes_of_triangles(t: &TriangleMesh, to_world: &DAffine3) -> Option<Extrem
     (used == 0b11_1111).then(|| found.map(|(value, _)| value))
 }
 
-/// Points with radii in a binary hierarchy of boxes: which of them reaches furthest in a direction is found without looking at all.
+/// Points with radii in a binary hierarchy of boxes: which of them reaches furthest in a direction
+/// is found without looking at all.
 struct Hierarchy {
     points: Vec<Vec4>,
-    /// Box of each node, as [`Node::children`] divides the points; children of node i are nodes 2 i + 1 and 2 i + 2.
+    /// Box of each node, as [`Node::children`] divides the points; children of node i are nodes 2 i
+    /// + 1 and 2 i + 2.
     boxes: Vec<[DVec3; 2]>,
 }
 
@@ -262,7 +270,7 @@ struct Node {
 }
 
 impl Node {
-    /// Its children; `None` for a leaf.
+    /// Children of the node; `None` for a leaf.
     fn children(self) -> Option<[Self; 2]> {
         let Self { index, start, end } = self;
         let middle = start + (end - start) / 2;
@@ -364,7 +372,7 @@ mod tests {
         Scene { meshes, instances: transforms.enumerate().map(place).collect(), ..Scene::default() }
     }
 
-    /// The same by every vertex and sphere of every instance.
+    /// Computes the bounds from every vertex and sphere of every instance.
     fn slow(scene: &Scene) -> (DVec3, DVec3) {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for i in &scene.instances {

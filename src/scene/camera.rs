@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Clipping planes: a camera sees what lies between them. Distances along the view direction, scene units.
+/// Clipping planes: a camera sees what lies between them. Distances along the view direction, scene
+/// units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlanes {
     /// Distance of the near plane, at least 0.
@@ -18,7 +19,8 @@ impl ClipPlanes {
     /// A camera sees everything in front of it.
     pub const NONE: Self = Self { near: 0.0, far: f64::INFINITY };
 
-    /// Where a ray from the camera passes the planes; `depth`: how much a unit of its length takes it along the view direction.
+    /// Where a ray from the camera passes the planes; `depth`: how much a unit of its length takes
+    /// it along the view direction.
     pub fn of_ray(self, depth: f64) -> [f64; 2] {
         [self.near / depth, self.far / depth]
     }
@@ -99,8 +101,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A perspective camera at `eye` looking at `target`. `up` need not be perpendicular; when it is parallel to the view
-    /// direction another one is chosen. `fov_y` in radians.
+    /// A perspective camera at `eye` looking at `target`. `up` need not be perpendicular; when it
+    /// is parallel to the view direction another one is chosen. `fov_y` in radians.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Self {
         let back = (eye - target).try_normalize().unwrap_or(DVec3::Z);
         let right = up.cross(back).try_normalize().filter(|r| r.is_finite()).unwrap_or_else(|| back.any_orthonormal_vector());
@@ -114,8 +116,8 @@ impl Camera {
         }
     }
 
-    /// A 45-degree camera that sees all of the given bounds from the front, slightly above and to the side, as large as fits;
-    /// `aspect` is width over height.
+    /// A 45-degree camera that sees all of the given bounds from the front, slightly above and to
+    /// the side, as large as fits; `aspect` is width over height.
     pub fn framing(lo: DVec3, hi: DVec3, aspect: f64) -> Self {
         let centre = (lo + hi) * 0.5;
         let half = ((hi - lo) * 0.5).max(DVec3::splat(1e-30));
@@ -135,16 +137,19 @@ impl Camera {
         Self::look_at(centre + direction * (distance * 1.05), centre, DVec3::Y, fov_y)
     }
 
-    /// A perspective camera that looks against `from` (a direction, from the scene to the camera) and sees all of these spheres (centres and radii; 0 for points) as large as
-    /// fits, with a margin of 5 %. `fov_y` in radians, `aspect` is width over height. `None` without spheres.
+    /// A perspective camera that looks against `from` (a direction, from the scene to the camera)
+    /// and sees all of these spheres (centres and radii; 0 for points) as large as fits, with a
+    /// margin of 5 %. `fov_y` in radians, `aspect` is width over height. `None` without spheres.
     pub fn enclosing(spheres: &[(DVec3, f64)], from: DVec3, up: DVec3, fov_y: f64, aspect: f64) -> Option<Self> {
         let basis = Self::look_at(from, DVec3::ZERO, up, fov_y).camera_to_world.matrix3;
         let (right, up, back) = (basis.x_axis, basis.y_axis, basis.z_axis);
         let tan_y = (fov_y * 0.5).tan() / 1.05;
         let tans = [tan_y * aspect, tan_y];
         let slants = tans.map(|t| (1.0 + t * t).sqrt());
-        // Seen by a camera at (x, y, z) of its own axes, a point p lies within the planes at the right and left if +-(p.x - x) <= tan (z - p.z). So
-        // tan z +- x is no less than the greatest tan p.z +- p.x of all points; the same holds above and below. A sphere of radius r adds r / cos.
+        // Seen by a camera at (x, y, z) of its own axes, a point p lies within the planes at the
+        // right and left if +-(p.x - x) <= tan (z - p.z). So tan z +- x is no less than the
+        // greatest tan p.z +- p.x of all points; the same holds above and below. A sphere of radius
+        // r adds r / cos.
         let (mut most, mut nearest) = ([[f64::NEG_INFINITY; 2]; 2], f64::NEG_INFINITY);
         for &(centre, radius) in spheres {
             let (along, z) = ([centre.dot(right), centre.dot(up)], centre.dot(back));
@@ -173,7 +178,8 @@ impl Camera {
     }
 }
 
-/// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as much of +y as it can.
+/// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as
+/// much of +y as it can.
 pub(in crate::scene) fn rigid(to_world: &DAffine3) -> DAffine3 {
     let back = to_world.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
     let right = to_world.matrix3.y_axis.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
@@ -208,7 +214,8 @@ mod tests {
             let camera = Camera::enclosing(&points, from, DVec3::Y, fov_y, aspect).unwrap();
             let world_to_camera = camera.camera_to_world.inverse();
             let tan = (fov_y / 2.0).tan();
-            // how far out the outermost point of each sphere lies on each side, 1 at the border of the image
+            // how far out the outermost point of each sphere lies on each side, 1 at the border of
+            // the image
             let mut sides = [f64::NEG_INFINITY; 4];
             for (centre, radius) in &points {
                 let p = world_to_camera.transform_point3(*centre);

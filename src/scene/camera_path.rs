@@ -8,8 +8,9 @@ use super::Camera;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Interpolation {
-    /// A cubic through the keys, once continuously differentiable in time. No coordinate leaves the range of the two keys that it
-    /// is between, so a camera that rests stays where it is (Fritsch and Butland 1984).
+    /// A cubic through the keys, once continuously differentiable in time. No coordinate leaves the
+    /// range of the two keys that it is between, so a camera that rests stays where it is (Fritsch
+    /// and Butland 1984).
     #[default]
     Smooth,
     /// A straight line at constant speed.
@@ -29,15 +30,18 @@ pub struct Key {
     pub up: DVec3,
     /// Full vertical field of view in radians, of 0.001 to 179 degrees.
     pub fov_y: f64,
-    /// A cut: the camera stands still at the key before this one until this one's frame, and is here then.
+    /// A cut: the camera stands still at the key before this one until this one's frame, and is
+    /// here then.
     pub cut: bool,
 }
 
-/// A key without its frame, as numbers that are interpolated one by one: eye, target, up, field of view.
+/// A key without its frame, as numbers that are interpolated one by one: eye, target, up, field of
+/// view.
 type Pose = [f64; 10];
 
-/// A perspective camera that moves from key to key, but for cuts. Each number is interpolated by itself: keys must be near enough to each other
-/// that eye and target do not pass through one another on the way, nor the view through up.
+/// A perspective camera that moves from key to key, but for cuts. Each number is interpolated by
+/// itself: keys must be near enough to each other that eye and target do not pass through one
+/// another on the way, nor the view through up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
     fps: f64,
@@ -48,11 +52,13 @@ pub struct CameraPath {
 }
 
 impl CameraPath {
-    /// A path through at least one key, in the order of their frames; `fps` is frames per second, in [0.001, 1000].
+    /// A path through at least one key, in the order of their frames; `fps` is frames per second,
+    /// in [0.001, 1000].
     ///
     /// # Errors
-    /// A line that names the key and says what is wrong with it: frames that do not increase, numbers that are not finite (or
-    /// beyond 1e30), an eye in its target, an up that is zero or along the view, a field of view out of range.
+    /// A line that names the key and says what is wrong with it: frames that do not increase,
+    /// numbers that are not finite (or beyond 1e30), an eye in its target, an up that is zero or
+    /// along the view, a field of view out of range.
     pub fn new(keys: Vec<Key>, interpolation: Interpolation, fps: f64) -> Result<Self, String> {
         if !(0.001..=1000.0).contains(&fps) {
             return Err(format!("fps is {fps}; it must be between 0.001 and 1000"));
@@ -71,7 +77,7 @@ impl CameraPath {
         Ok(Self { fps, interpolation, keys, slopes })
     }
 
-    /// Its keys.
+    /// Keys of the path, in order.
     pub fn keys(&self) -> &[Key] {
         &self.keys
     }
@@ -92,13 +98,15 @@ impl CameraPath {
         (self.keys[0].frame, self.keys[self.keys.len() - 1].frame)
     }
 
-    /// Returns true if there is a cut between two frames: after `before`, and at `frame` or earlier.
+    /// Returns true if there is a cut between two frames: after `before`, and at `frame` or
+    /// earlier.
     pub fn has_cut(&self, before: f64, frame: f64) -> bool {
         // what precedes the first key is no other shot
         self.keys.iter().skip(1).any(|key| key.cut && before < key.frame && key.frame <= frame)
     }
 
-    /// The camera at a frame, which may be fractional; before the first key and after the last it does not move.
+    /// The camera at a frame, which may be fractional; before the first key and after the last it
+    /// does not move.
     pub fn camera_at(&self, frame: f64) -> Camera {
         let Key { eye, target, up, fov_y, .. } = self.key_at(frame);
         Camera::look_at(eye, target, up, fov_y)
@@ -163,7 +171,8 @@ fn check(key: &Key, frame_before: Option<f64>) -> Result<(), String> {
     Ok(())
 }
 
-/// The slope of every number at every key, of a piecewise cubic that stays monotone where the keys are.
+/// The slope of every number at every key, of a piecewise cubic that stays monotone where the keys
+/// are.
 fn slopes(keys: &[Key]) -> Vec<Pose> {
     let poses: Vec<Pose> = keys.iter().map(pose).collect();
     let spans: Vec<f64> = keys.windows(2).map(|k| k[1].frame - k[0].frame).collect();
@@ -193,7 +202,8 @@ fn inner_slope(h0: f64, h1: f64, d0: f64, d1: f64) -> f64 {
     (w0 + w1) / (w0 / d0 + w1 / d1)
 }
 
-/// The slope of a parabola through the three keys at an end, kept from overshooting. `h0` and `d0` are nearest the end.
+/// The slope of a parabola through the three keys at an end, kept from overshooting. `h0` and `d0`
+/// are nearest the end.
 fn end_slope(h0: f64, h1: f64, d0: f64, d1: f64) -> f64 {
     let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
     if slope * d0 <= 0.0 {

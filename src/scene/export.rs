@@ -1,4 +1,5 @@
-//! Export of a [`Scene`](crate::scene::Scene): to glTF, which most tools read, and to a plain triangle soup for other tracers.
+//! Export of a [`Scene`](crate::scene::Scene): to glTF, which most tools read, and to a plain
+//! triangle soup for other tracers.
 
 mod gltf;
 mod icosphere;

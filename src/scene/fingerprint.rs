@@ -1,5 +1,5 @@
-//! Hashes of everything in a scene on which an image can depend, to check that a resumed render has the same scene. File names,
-//! cameras and render settings are not included.
+//! Hashes of everything in a scene on which an image can depend, to check that a resumed render has
+//! the same scene. File names, cameras and render settings are not included.
 
 use std::fmt::{Debug, Write};
 
@@ -7,9 +7,11 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::{Environment, EnvironmentMap, Geometry, Instance, Mesh, Scene, TexelData, Texture, TriangleMesh};
 
-/// The hash of geometry, materials, textures and lights, without the environment: 32 hexadecimal digits.
+/// The hash of geometry, materials, textures and lights, without the environment: 32 hexadecimal
+/// digits.
 pub fn of_scene(scene: &Scene) -> String {
     let mut hash = Fingerprint(Xxh3::new());
+
     // patterns without `..`: a new field must be considered here
     for Mesh { name: _, geometry, material } in &scene.meshes {
         hash.count(*material);
@@ -38,10 +40,12 @@ pub fn of_scene(scene: &Scene) -> String {
             }
         }
     }
+
     for Instance { name: _, mesh, object_to_world } in &scene.instances {
         hash.count(*mesh);
         hash.slice(&object_to_world.to_cols_array());
     }
+
     for Texture { name: _, width, height, texels, wrap, filter } in &scene.textures {
         hash.text(&(width, height, wrap, filter));
         match texels {
@@ -50,6 +54,7 @@ pub fn of_scene(scene: &Scene) -> String {
             TexelData::Float(rgba) => hash.slice(rgba),
         }
     }
+
     // the debug text has all fields, and all digits of numbers
     hash.text(&scene.materials);
     hash.text(&scene.lights);
@@ -114,17 +119,17 @@ mod tests {
     #[test]
     fn whatever_an_image_depends_on_changes_it() {
         let scene = builtin::by_name("cornell-box").unwrap();
-        let of = |change: &Change| {
+        let changed = |change: &Change| {
             let mut scene = scene.clone();
             change(&mut scene);
             of_scene(&scene)
         };
-        let same = of(&|_| ());
+        let same = changed(&|_| ());
         assert_eq!(same.len(), 32);
-        assert_eq!(of(&|s| s.name = "other".into()), same);
-        assert_eq!(of(&|s| s.cameras.clear()), same);
-        assert_eq!(of(&|s| s.hints.spp = Some(7)), same);
-        assert_eq!(of(&|s| s.environment = Environment::Uniform(Vec3::ONE)), same);
+        assert_eq!(changed(&|s| s.name = "other".into()), same);
+        assert_eq!(changed(&|s| s.cameras.clear()), same);
+        assert_eq!(changed(&|s| s.hints.spp = Some(7)), same);
+        assert_eq!(changed(&|s| s.environment = Environment::Uniform(Vec3::ONE)), same);
         let changes: [&Change; 7] = [
             &|s| s.materials[0].roughness += f32::EPSILON,
             &|s| s.instances[0].object_to_world.translation.x += 1e-12,
@@ -153,7 +158,7 @@ mod tests {
             },
         ];
         for (k, change) in changes.iter().enumerate() {
-            assert_ne!(of(change), same, "{k}");
+            assert_ne!(changed(change), same, "{k}");
         }
     }
 

@@ -1,4 +1,5 @@
-//! What a scene is made of, counted: for people and programs that look at it before they render it.
+//! Counts of what a scene is made of: for people and programs that look at it before they render
+//! it.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -29,7 +30,8 @@ pub struct Inventory {
     pub spheres: u64,
     /// Triangles without an area, which the loader has dropped.
     pub degenerate_triangles: usize,
-    /// Edges with a triangle on one side only: surfaces end there, and light gets to the other side. Vertices at the same place are one.
+    /// Edges with a triangle on one side only: surfaces end there, and light gets to the other
+    /// side. Vertices at the same place are one.
     pub open_edges: u64,
     /// Meshes without open edges.
     pub closed_meshes: usize,
@@ -66,8 +68,10 @@ pub struct TextureInventory {
 
 impl Inventory {
     /// Counts what a scene has.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn from_scene(scene: &Scene) -> Self {
         let bounds = scene.bounds();
+
+        // geometry and materials
         let of_mesh: Vec<(u64, u64)> = scene
             .meshes
             .par_iter()
@@ -81,6 +85,7 @@ impl Inventory {
         used.sort_unstable();
         used.dedup();
         used.iter().for_each(|k| *materials.entry(model(&scene.materials[*k])).or_default() += 1);
+
         let parts = scene.rig.as_ref().map(|r| r.parts());
         let deformations = parts.map_or(&[][..], |p| &p.deformations);
         Self {
@@ -197,16 +202,16 @@ mod tests {
 
     #[test]
     fn scenes_are_counted() {
-        let of = |name: &str| Inventory::of(&builtin::by_name(name).unwrap());
-        let cornell = of("cornell-box");
+        let inventory = |name: &str| Inventory::from_scene(&builtin::by_name(name).unwrap());
+        let cornell = inventory("cornell-box");
         assert_eq!((cornell.lights.get("emitting instances"), cornell.environment.as_str()), (Some(&1), "none"));
         assert_eq!(cornell.triangles, cornell.unique_triangles);
         assert!(cornell.materials.keys().any(|m| m.contains("emission")), "{:?}", cornell.materials);
-        let grid = of("grid:4");
+        let grid = inventory("grid:4");
         assert!(grid.triangles > 4 * grid.unique_triangles && grid.instances > 4, "{grid:?}");
-        let spheres = of("spheres:50");
+        let spheres = inventory("spheres:50");
         assert!(spheres.spheres > 0);
-        let parade = of("parade");
+        let parade = inventory("parade");
         assert!(!parade.animations.is_empty());
     }
 

@@ -19,20 +19,23 @@ pub struct Light {
     pub position: DVec3,
     /// World direction in which it emits, of unit length.
     pub direction: DVec3,
-    /// Distance in scene units beyond which it has no effect (KHR_lights_punctual range); infinite by default.
+    /// Distance in scene units beyond which it has no effect (KHR_lights_punctual range); infinite
+    /// by default.
     pub range: f64,
 }
 
 impl Light {
-    /// Places it at a node of this transform to world space, without scale: as in KHR_lights_punctual it emits along the node's negative z axis.
+    /// Places it at a node of this transform to world space, without scale: as in
+    /// KHR_lights_punctual it emits along the node's negative z axis.
     pub fn place(&mut self, to_world: &DAffine3) {
         self.position = to_world.translation;
         self.direction = -to_world.matrix3.z_axis;
     }
 }
 
-/// A rectangle through which the environment lights a room: a window, a door, a skylight. It guides the sampling of the environment, and neither emits nor blocks light: images
-/// differ only in noise. Light that enters elsewhere is still found.
+/// A rectangle through which the environment lights a room: a window, a door, a skylight. It guides
+/// the sampling of the environment, and neither emits nor blocks light: images differ only in
+/// noise. Light that enters elsewhere is still found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Portal {
     /// World position of a corner.

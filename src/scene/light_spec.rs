@@ -1,4 +1,5 @@
-//! Lights that are not in a scene's file, described in a line of text: `point position=0,2,0 intensity=100`.
+//! Lights that are not in a scene's file, described in a line of text:
+//! `point position=0,2,0 intensity=100`.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -18,7 +19,7 @@ pub struct LightSpec {
     power: Vec3,
 }
 
-/// What emits.
+/// Shape of the emitter.
 #[derive(Clone, Debug)]
 enum Shape {
     Punctual(PlacedLight),
@@ -60,6 +61,8 @@ pub fn parse(text: &str) -> Result<LightSpec, String> {
     let kind = words.next().ok_or_else(|| format!("empty: {}, then key=value", kinds()))?;
     let given = words.map(|w| w.split_once('=').ok_or_else(|| format!("'{w}' is no key=value"))).collect::<Result<_, _>>()?;
     let mut keys = Keys::new(kind, given);
+
+    // the shape
     let punctual = LightKind::TYPES.iter().find(|t| t.word == kind);
     let (shape, unit) = match (punctual, kind) {
         (Some(light), _) => (Shape::Punctual((light.read)(&mut keys)?), light.strength),
@@ -83,6 +86,8 @@ pub fn parse(text: &str) -> Result<LightSpec, String> {
         }
         (None, other) => return Err(format!("'{other}' is no light: {}", kinds())),
     };
+
+    // the strength and colour
     let strength = keys.needed(unit, positive)?;
     let tint = match (keys.take("color"), keys.take("temperature")) {
         (Some(_), Some(_)) => return Err("color or temperature, not both".into()),
@@ -125,7 +130,8 @@ impl<'de> serde::Deserialize<'de> for LightSpec {
 }
 
 impl LightSpec {
-    /// Puts it into a scene, in the file's world coordinates: what has an extent as a surface that emits from its front, reflects nothing, is seen and casts shadows.
+    /// Puts it into a scene, in the file's world coordinates: what has an extent as a surface that
+    /// emits from its front, reflects nothing, is seen and casts shadows.
     pub fn add(&self, scene: &mut Scene) {
         let (geometry, position) = match self.shape {
             Shape::Punctual(PlacedLight { kind, position, direction }) => {
@@ -157,7 +163,8 @@ impl LightSpec {
     }
 }
 
-/// Two directions in the plane that faces `direction`, of which the first is horizontal where there is such a one; `direction` is their cross product.
+/// Two directions in the plane that faces `direction`, of which the first is horizontal where there
+/// is such a one; `direction` is their cross product.
 fn across(direction: DVec3) -> (DVec3, DVec3) {
     let u = DVec3::Y.cross(direction).try_normalize().unwrap_or(DVec3::X);
     (u, direction.cross(u))
@@ -174,7 +181,8 @@ fn disk(direction: DVec3, radius: f64) -> Geometry {
     let mut mesh = crate::scene::TriangleMesh::default();
     mesh.positions.push(Vec3::ZERO);
     mesh.positions.extend((0..DISK_CORNERS).map(|k| corner(k).as_vec3()));
-    // the centre second: solid angles are sampled from there outwards, so a fan's samples are as even as those of one disk
+    // the centre second: solid angles are sampled from there outwards, so a fan's samples are as
+    // even as those of one disk
     mesh.indices.extend((0..DISK_CORNERS).map(|k| [1 + (k + 1) % DISK_CORNERS, 0, 1 + k]));
     Geometry::Triangles(mesh)
 }

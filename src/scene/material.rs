@@ -1,4 +1,5 @@
-//! Materials as files describe them: glTF metallic-roughness with its extensions, and the named materials of `.brhan`.
+//! Materials as files describe them: glTF metallic-roughness with its extensions, and the named
+//! materials of `.brhan`.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +27,8 @@ pub enum AlphaMode {
         /// Usually 0.5.
         cutoff: f32,
     },
-    /// Coverage: the path tracer treats it as stochastic alpha, occlusion streams as a mask with cutoff 0.5.
+    /// Coverage: the path tracer treats it as stochastic alpha, occlusion streams as a mask with
+    /// cutoff 0.5.
     Blend,
 }
 
@@ -177,14 +179,15 @@ pub struct Material {
     pub alpha_mode: AlphaMode,
     /// Both faces are shaded. Visibility does not depend on it: rays hit both faces.
     pub double_sided: bool,
-    /// Index of refraction (KHR_materials_ior, `Ni`): at least 1. In glTF also 0, for a Fresnel term of 1 that leaves reflection to the specular
-    /// colour; such a material does not refract.
+    /// Index of refraction (KHR_materials_ior, `Ni`): at least 1. In glTF also 0, for a Fresnel
+    /// term of 1 that leaves reflection to the specular colour; such a material does not refract.
     pub ior: f32,
     /// Specular colour of MTL/.brhan (`Ks`, `specular[]`, `reflectance[]`).
     pub specular_color: Vec3,
     /// Transmitted colour of MTL/.brhan (`Tf`, `transmittance[]`).
     pub transmittance: Vec3,
-    /// `d` of an MTL material where it is below 1 and nothing else says glass: what it means is a setting ([`super::SceneSettings`]).
+    /// `d` of an MTL material where it is below 1 and nothing else says glass: what it means is a
+    /// setting ([`super::SceneSettings`]).
     pub mtl_dissolve: Option<f32>,
     /// KHR_materials_unlit.
     pub unlit: bool,
@@ -194,15 +197,17 @@ pub struct Material {
     pub sheen: Sheen,
     /// KHR_materials_transmission and KHR_materials_volume.
     pub transmission: Transmission,
-    /// Priority of nested dielectrics: where volumes overlap, the one with the highest priority applies; of equal ones, the one that the path entered last
-    /// (Schmidt, Budge 2002). glTF: `extras.dielectricPriority` of the material.
+    /// Priority of nested dielectrics: where volumes overlap, the one with the highest priority
+    /// applies; of equal ones, the one that the path entered last (Schmidt, Budge 2002). glTF:
+    /// `extras.dielectricPriority` of the material.
     pub dielectric_priority: i32,
     /// KHR_materials_specular.
     pub specular: Specular,
     /// KHR_materials_anisotropy.
     pub anisotropy: Anisotropy,
-    /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF material, unknown statements of an MTL file,
-    /// `sigma[]` of `.brhan`. docs/materials.md lists those that are used.
+    /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF
+    /// material, unknown statements of an MTL file, `sigma[]` of `.brhan`. docs/materials.md lists
+    /// those that are used.
     pub parameters: BTreeMap<String, f32>,
 }
 

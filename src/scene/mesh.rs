@@ -42,7 +42,8 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Object-space bounds `(min, max)`, or `None` when empty. Only corners that a triangle uses count.
+    /// Object-space bounds `(min, max)`, or `None` when empty. Only corners that a triangle uses
+    /// count.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut b: Option<(Vec3, Vec3)> = None;
         let mut add = |lo: Vec3, hi: Vec3| b = Some(b.map_or((lo, hi), |(l, h)| (l.min(lo), h.max(hi))));
@@ -61,7 +62,8 @@ impl Geometry {
         b.map(|(l, h)| (l.as_dvec3(), h.as_dvec3()))
     }
 
-    /// The vertices that triangles use, each once with 0, or the centres of spheres with their radii.
+    /// The vertices that triangles use, each once with 0, or the centres of spheres with their
+    /// radii.
     pub fn points(&self) -> Vec<Vec4> {
         match self {
             Geometry::Triangles(t) => {

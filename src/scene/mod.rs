@@ -1,7 +1,8 @@
-//! The scene: plain host data, no Vulkan. Loaders make it, [`crate::accel::flatten`] turns it into what tracers consume.
+//! The scene: plain host data, no Vulkan. Loaders make it, [`crate::accel::flatten`] turns it into
+//! what tracers consume.
 //!
-//! Conventions, everywhere: right-handed, lengths in scene units (metres in glTF), angles in radians, colours linear with
-//! sRGB primaries, triangles counter-clockwise seen from their front.
+//! Conventions, everywhere: right-handed, lengths in scene units (metres in glTF), angles in
+//! radians, colours linear with sRGB primaries, triangles counter-clockwise seen from their front.
 
 pub mod animation;
 pub mod blackbody;
@@ -39,8 +40,8 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
 
-/// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
-/// and rays would miss.
+/// Largest coordinate, in object and world space: beyond it the triangle test's products of three
+/// lengths overflow single precision, and rays would miss.
 pub const MAX_COORDINATE: f64 = 1e12;
 
 /// A mesh placed in the world.
@@ -50,7 +51,8 @@ pub struct Instance {
     pub name: String,
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Object to world, composed on the host in f64. World here is the file's world, before rebasing by [`Scene::origin`].
+    /// Object to world, composed on the host in f64. World here is the file's world, before
+    /// rebasing by [`Scene::origin`].
     pub object_to_world: DAffine3,
 }
 
@@ -59,7 +61,8 @@ pub struct Instance {
 pub struct LoadReport {
     /// One line each: ignored optional extensions, missing textures, ...
     pub warnings: Vec<String>,
-    /// Files that it was read from: models, materials, buffers and images, also those that could not be read.
+    /// Files that it was read from: models, materials, buffers and images, also those that could
+    /// not be read.
     pub files: Vec<PathBuf>,
     /// Extensions that a glTF file names.
     pub extensions: Vec<FileExtension>,
@@ -69,7 +72,8 @@ pub struct LoadReport {
     pub degenerate_triangles: usize,
     /// Meshes whose normals were computed because the file had none.
     pub normals_computed: usize,
-    /// Meshes whose tangents were computed (MikkTSpace) because a normal map needs them and the file had none.
+    /// Meshes whose tangents were computed (MikkTSpace) because a normal map needs them and the
+    /// file had none.
     pub tangents_computed: usize,
 }
 
@@ -149,7 +153,8 @@ impl Scene {
         self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
     }
 
-    /// Whether nothing in it emits light: it has no environment, no lights, and no surface that emits or shows its colour unlit.
+    /// Whether nothing in it emits light: it has no environment, no lights, and no surface that
+    /// emits or shows its colour unlit.
     pub fn is_dark(&self) -> bool {
         let shines = |i: &Instance| {
             let material = &self.materials[self.meshes[i.mesh].material];
@@ -158,26 +163,30 @@ impl Scene {
         self.environment == Environment::Black && self.lights.is_empty() && !self.instances.iter().any(shines)
     }
 
-    /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for an empty scene.
+    /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for
+    /// an empty scene.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds::of_scene(self)
     }
 
-    /// Whether a ray that leaves the scene may see an emitter: an environment, or a directional light with an angular diameter.
+    /// Whether a ray that leaves the scene may see an emitter: an environment, or a directional
+    /// light with an angular diameter.
     pub fn has_visible_sky(&self) -> bool {
         let is_disk = |l: &Light| matches!(l.kind, LightKind::Directional { angle } if angle > 0.0);
         self.environment != Environment::Black || self.lights.iter().any(is_disk)
     }
 
-    /// The point that tracers use as their origin, in the file's world space: zero for a scene around the origin, the
-    /// centre of the bounds for one that lies far away from it compared with its size, so that single precision is spent
-    /// on the scene and not on its distance. Rounded to f32, so that subtracting it is exact where it can be.
+    /// The point that tracers use as their origin, in the file's world space: zero for a scene
+    /// around the origin, the centre of the bounds for one that lies far away from it compared with
+    /// its size, so that single precision is spent on the scene and not on its distance. Rounded to
+    /// f32, so that subtracting it is exact where it can be.
     pub fn origin(&self) -> DVec3 {
         self.bounds().map_or(DVec3::ZERO, |(lo, hi)| distant_centre(lo, hi))
     }
 }
 
-/// The centre of bounds that are far from the origin for their size, rounded to f32; zero for others.
+/// The centre of bounds that are far from the origin for their size, rounded to f32; zero for
+/// others.
 pub(crate) fn distant_centre(lo: DVec3, hi: DVec3) -> DVec3 {
     let (centre, extent) = ((lo + hi) * 0.5, (hi - lo).max_element());
     // up to four times its own size away costs two bits; leave such scenes where they are

@@ -3,7 +3,8 @@
 use super::{Geometry, Scene};
 use crate::error::{Error, Result};
 
-/// The instances and meshes of a scene that may change after its upload. The default is a static scene, for which tracers keep no state.
+/// The instances and meshes of a scene that may change after its upload. The default is a static
+/// scene, for which tracers keep no state.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Motion {
     /// Instances that may move, as indices into [`Scene::instances`].
@@ -18,7 +19,8 @@ impl Motion {
         self.instances.is_empty() && self.meshes.is_empty()
     }
 
-    /// Fails for instances and meshes that the scene does not have, and for spheres, which do not deform.
+    /// Fails for instances and meshes that the scene does not have, and for spheres, which do not
+    /// deform.
     pub(crate) fn check(&self, scene: &Scene) -> Result<()> {
         if let Some(i) = self.instances.iter().find(|&&i| i >= scene.instances.len()) {
             return Err(Error::Usage(format!("instance {i} cannot move: the scene has {}", scene.instances.len())));

@@ -37,7 +37,8 @@ settings! {
 }
 
 impl SceneSettings {
-    /// Applies them to a loaded scene, whatever was applied before. Returns true if that has changed it.
+    /// Applies them to a loaded scene, whatever was applied before. Returns true if that has
+    /// changed it.
     pub fn apply(&self, scene: &mut Scene) -> bool {
         let meaning = self.mtl_dissolve.unwrap_or_default();
         let mut has_changed = false;

@@ -17,7 +17,8 @@ pub enum Filter {
     Linear,
 }
 
-/// RGBA of all texels of an image, rows from the top. Shared: two textures may sample one image differently.
+/// RGBA of all texels of an image, rows from the top. Shared: two textures may sample one image
+/// differently.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TexelData {
     /// 8-bit unsigned normalized channels.
@@ -58,7 +59,8 @@ impl TexelData {
         texel
     }
 
-    /// Texel `i` with linear colours, of a texture that is used as sRGB: `decoded_texel` of shaders/scene/texture.glsl.
+    /// Texel `i` with linear colours, of a texture that is used as sRGB: `decoded_texel` of
+    /// shaders/scene/texture.glsl.
     ///
     /// # Panics
     /// When there is no such texel.
@@ -113,8 +115,9 @@ impl From<Vec<f32>> for TexelData {
     }
 }
 
-/// An RGBA image with its sampler. The use decides whether integer RGB is sRGB or linear: base colour, emission, sheen colour and
-/// specular colour are sRGB, everything else is linear; alpha is always linear.
+/// An RGBA image with its sampler. The use decides whether integer RGB is sRGB or linear: base
+/// colour, emission, sheen colour and specular colour are sRGB, everything else is linear; alpha is
+/// always linear.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// File name or image name; may be empty.

@@ -227,7 +227,7 @@ fn level(setup: &Setup, kind: TracerKind, name: &str, turns: u32, watch: &mut Wa
         level.push(sum / f64::from(TURN));
     }
     // histories have filled up
-    let drift = Drift::of(&level[4..]).ok_or_else(|| Error::CheckFailed("too few frames".into()))?;
+    let drift = Drift::from_values(&level[4..]).ok_or_else(|| Error::CheckFailed("too few frames".into()))?;
     let change = (drift.slope * level.len() as f64).abs();
     let value = if unsound > 0 || !drift.is_level() { f64::NAN } else { change };
     let sentence = format!(

@@ -232,7 +232,7 @@ fn scene_of(setup: &Setup) -> Result<&Scene> {
 
 /// What the scene's data will do, a check each.
 pub fn data(scene: &Scene) -> Vec<Check> {
-    let (inventory, anatomy) = (Inventory::of(scene), Anatomy::of(scene));
+    let (inventory, anatomy) = (Inventory::from_scene(scene), Anatomy::of(scene));
     let mut out = Vec::new();
     let mut report = |name: &str, value: f64, unit: &'static str, sentence: String| {
         out.push(Check::reported(name, value, unit).says(sentence));

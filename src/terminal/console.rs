@@ -1,7 +1,8 @@
 //! Terminal output: results on stdout, everything else on stderr. A closed pipe is not an error.
 //!
-//! All that the program prints goes through [`print`], [`json`], [`error`] and [`note`]. What files call their cameras, channels or settings is a part of it, so none of
-//! them lets a character through that a terminal obeys.
+//! All that the program prints goes through [`print`], [`json`], [`error`] and [`note`]. What files
+//! call their cameras, channels or settings is a part of it, so none of them lets a character
+//! through that a terminal obeys.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -64,8 +65,8 @@ impl Console {
         if self.json { json(value) } else { Ok(()) }
     }
 
-    /// Prints the result of a command that has one even if it fails. In JSON mode the failure is part of the one record, under
-    /// `error` and `exit_code`. `value` must serialize to a map.
+    /// Prints the result of a command that has one even if it fails. In JSON mode the failure is
+    /// part of the one record, under `error` and `exit_code`. `value` must serialize to a map.
     pub fn close(&self, value: &impl Serialize, outcome: Result<()>) -> Result<(), Failure> {
         #[derive(Serialize)]
         struct Failed<'a, T> {
@@ -100,18 +101,21 @@ impl Console {
     }
 }
 
-/// Returns true for characters that a terminal obeys instead of showing them: control characters, line and paragraph separators, and those that reorder a line.
+/// Returns true for characters that a terminal obeys instead of showing them: control characters,
+/// line and paragraph separators, and those that reorder a line.
 fn is_obeyed(c: char) -> bool {
     let reorders = matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control() || reorders
 }
 
-/// Replaces line breaks, other characters that a terminal obeys and runs of white space by single spaces.
+/// Replaces line breaks, other characters that a terminal obeys and runs of white space by single
+/// spaces.
 pub fn one_line(text: &str) -> String {
     text.split(|c: char| c.is_whitespace() || is_obeyed(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// Replaces each character that a terminal obeys by a space, except those of `kept`: columns stay where they are.
+/// Replaces each character that a terminal obeys by a space, except those of `kept`: columns stay
+/// where they are.
 pub fn visible(text: &str, kept: &[char]) -> String {
     text.chars().map(|c| if is_obeyed(c) && !kept.contains(&c) { ' ' } else { c }).collect()
 }
@@ -158,15 +162,17 @@ pub fn json(value: &impl Serialize) -> Result<()> {
     write(&(escaped(&text) + "\n"))
 }
 
-/// JSON whose strings have escapes for all that a terminal obeys; the format itself requires them for some only.
+/// JSON whose strings have escapes for all that a terminal obeys; the format itself requires them
+/// for some only.
 fn escaped(json: &str) -> String {
     use std::fmt::Write;
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {
-        match is_obeyed(c) {
+        if is_obeyed(c) {
             // writing to a string does not fail
-            true => drop(write!(out, "\\u{:04x}", u32::from(c))),
-            false => out.push(c),
+            drop(write!(out, "\\u{:04x}", u32::from(c)));
+        } else {
+            out.push(c);
         }
     }
     out

@@ -1,5 +1,5 @@
-//! Signals. Ctrl-C and SIGTERM: the first asks for a clean stop, the second ends the process at once. A file that exceeds the limit for files (`ulimit -f`) is an error of its
-//! write.
+//! Signals. Ctrl-C and SIGTERM: the first asks for a clean stop, the second ends the process at
+//! once. A file that exceeds the limit for files (`ulimit -f`) is an error of its write.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,12 +34,14 @@ pub fn install() {
     });
 }
 
-/// Lets a write beyond the limit for files (`ulimit -f`) fail as one to a full disk does, in place of a signal (SIGXFSZ) that ends the process: in this thread and those that it starts.
+/// Lets a write beyond the limit for files (`ulimit -f`) fail as one to a full disk does, in place
+/// of a signal (SIGXFSZ) that ends the process: in this thread and those that it starts.
 pub fn block_file_size_signal() {
     #[cfg(unix)]
     {
         use nix::sys::signal::{SigSet, Signal};
-        // a failure leaves the system's own behaviour: the process ends, and no file has its name yet
+        // a failure leaves the system's own behaviour: the process ends, and no file has its name
+        // yet
         let _ = SigSet::from(Signal::SIGXFSZ).thread_block();
     }
 }
@@ -72,7 +74,8 @@ impl Control for ProgressControl {
     }
 }
 
-/// Stops work on Ctrl-C without showing its progress: for work that is one of many steps of the progress bar.
+/// Stops work on Ctrl-C without showing its progress: for work that is one of many steps of the
+/// progress bar.
 pub struct SilentControl;
 
 impl Control for SilentControl {

@@ -1,4 +1,5 @@
-//! What a command prints while it works through a list: a line for each item as soon as it is done, above the progress of all.
+//! Lines that a command prints while it works through a list: one for each item as soon as it is
+//! done, above the progress of all.
 
 use super::console::Console;
 use super::interrupt;
@@ -31,7 +32,8 @@ impl Lines {
     /// Prints a line.
     ///
     /// # Errors
-    /// [`crate::Error::Output`] if it cannot be printed, [`crate::Error::Interrupted`] after Ctrl-C.
+    /// [`crate::Error::Output`] if it cannot be printed, [`crate::Error::Interrupted`] after
+    /// Ctrl-C.
     pub fn print(&mut self, line: &str) -> Result<()> {
         self.progress.suspend(|| self.console.line(line))?;
         interrupt::check()

@@ -1,4 +1,5 @@
-//! Terminal interface shared by the commands: output options, text or JSON, warnings, progress bars, Ctrl-C, panics.
+//! Terminal interface shared by the commands: output options, text or JSON, warnings, progress
+//! bars, Ctrl-C, panics.
 
 pub mod console;
 pub mod interrupt;

@@ -1,4 +1,5 @@
-//! Reports a panic, which is a bug, in one line and with an exit code of its own instead of a stack trace.
+//! Reports a panic, which is a bug, in one line and with an exit code of its own instead of a stack
+//! trace.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
 use std::sync::Mutex;

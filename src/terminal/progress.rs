@@ -1,4 +1,5 @@
-//! Progress on stderr: a bar on a terminal, for work that takes longer than a second; else, as in the log of a build server, a line from time to time.
+//! Progress on stderr: a bar on a terminal, for work that takes longer than a second; else, as in
+//! the log of a build server, a line from time to time.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -101,7 +102,8 @@ impl Progress {
     }
 }
 
-/// When lines are printed: not more often than `interval`, and then once another tenth of the work is done, or after a longer wait.
+/// When lines are printed: not more often than `interval`, and then once another tenth of the work
+/// is done, or after a longer wait.
 struct LinePace {
     interval: Duration,
     // of the last line: the time, and the share that was done
@@ -134,10 +136,8 @@ impl LinePace {
 /// `rendering: 30 % after 12 s, about 28 s left`.
 fn line_text(label: &str, elapsed: Duration, share: f64) -> String {
     let seconds = elapsed.as_secs_f64();
-    let left = match share > 0.0 {
-        true => format!(", about {} left", duration_text(seconds * (1.0 - share) / share)),
-        false => String::new(),
-    };
+    let left =
+        if share > 0.0 { format!(", about {} left", duration_text(seconds * (1.0 - share) / share)) } else { String::new() };
     format!("{label}: {:.0} % after {}{left}", 100.0 * share, duration_text(seconds))
 }
 

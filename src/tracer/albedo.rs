@@ -1,12 +1,15 @@
-//! Directional albedos of microfacet and sheen BSDFs by cosine and roughness: the tables of shaders/bsdf/albedo.glsl, integrated when a
-//! scene is uploaded whose materials require them.
+//! Directional albedos of microfacet and sheen BSDFs by cosine and roughness: the tables of
+//! shaders/bsdf/albedo.glsl, integrated when a scene is uploaded whose materials require them.
 //!
-//! The integrals are over the visible normals of GGX (Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 2018), by stratified
-//! points: what is left to sum is a Smith term and Fresnel's, both smooth. Beckmann's and Charlie's are by the midpoint rule.
+//! The integrals are over the visible normals of GGX (Heitz, "Sampling the GGX Distribution of
+//! Visible Normals", JCGT 2018), by stratified points: what is left to sum is a Smith term and
+//! Fresnel's, both smooth. Beckmann's and Charlie's are by the midpoint rule.
 //!
-//! Microfacets of any roughness hide and shadow alike once the surface is stretched until its roughness is 1: their albedo has its least, 0.89,
-//! where the cosine is alpha, and the stretched cosine as an axis holds it in place. What follows the cosine itself, as Fresnel's term does, is
-//! divided by that and has a table of its own. Both axes are square roots, for the sake of grazing angles.
+//! Microfacets of any roughness hide and shadow alike once the surface is stretched until its
+//! roughness is 1: their albedo has its least, 0.89, where the cosine is alpha, and the stretched
+//! cosine as an axis holds it in place. What follows the cosine itself, as Fresnel's term does, is
+//! divided by that and has a table of its own. Both axes are square roots, for the sake of grazing
+//! angles.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -45,12 +48,12 @@ enum Table {
     Schlick,
     Sheen,
     Beckmann,
-    /// By the bits of the index of refraction, of both sides.
+    /// Tables of both sides of a dielectric, by the bits of its index of refraction.
     Glass(u32),
 }
 
 impl Table {
-    /// Its layers.
+    /// Computes the layers of the table.
     fn compute(self) -> Vec<f32> {
         match self {
             Self::Ggx => layers(|x, r| [ggx(unstretched(x, r), r)[0]]),
@@ -62,19 +65,19 @@ impl Table {
             Self::Beckmann => layers(|x, r| [beckmann(unstretched(x, r), r)]),
             Self::Glass(bits) => {
                 let ior = f64::from(f32::from_bits(bits));
-                let of = |eta| {
+                let side = |eta| {
                     layers(|x, r| {
                         let [total, reflected, open, closed] = dielectric(cosine(x), r, eta);
                         let whole = ggx(cosine(x), r)[0];
                         [total / whole, reflected / whole, open, closed]
                     })
                 };
-                [of(ior), of(1.0 / ior)].concat()
+                [side(ior), side(1.0 / ior)].concat()
             }
         }
     }
 
-    /// Its layers, from memory if this process has computed them before.
+    /// Returns the layers of the table, from memory if this process has computed them before.
     fn layers(self) -> Vec<f32> {
         static KNOWN: LazyLock<Mutex<HashMap<Table, Vec<f32>>>> = LazyLock::new(Mutex::default);
         let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -88,7 +91,8 @@ impl Table {
     }
 }
 
-/// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`: indices of refraction.
+/// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`:
+/// indices of refraction.
 pub(super) fn tables(wanted: AlbedoTables, glass: &[f32]) -> Vec<f32> {
     let ggx_wanted = wanted.ggx || !glass.is_empty();
     let tables = [
@@ -119,7 +123,8 @@ fn cosine(x: f64) -> f64 {
     (x * x).max(MIN_COSINE)
 }
 
-/// The cosine whose stretched cosine is at a coordinate of the axis: the inverse of `stretched()` in shaders/bsdf/albedo.glsl.
+/// The cosine whose stretched cosine is at a coordinate of the axis: the inverse of `stretched()`
+/// in shaders/bsdf/albedo.glsl.
 fn unstretched(x: f64, roughness: f64) -> f64 {
     let v2 = cosine(x).powi(2);
     let scaled = v2 * roughness.powi(4);
@@ -137,7 +142,8 @@ fn lambda(alpha: f64, cosine: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)
 }
 
-/// A point of an integral over normals on one side of the plane of wo: the other side is its mirror image.
+/// A point of an integral over normals on one side of the plane of wo: the other side is its mirror
+/// image.
 struct Point {
     /// Cosine and sine of the azimuth.
     azimuth: [f64; 2],
@@ -148,8 +154,8 @@ struct Point {
 }
 
 impl Point {
-    /// Warps the second coordinate so that points are denser near 1, where normals are nearly those of the surface and most reflected
-    /// directions are above it.
+    /// Warps the second coordinate so that points are denser near 1, where normals are nearly those
+    /// of the surface and most reflected directions are above it.
     fn spaced(x: f64, y: f64, points: usize) -> Self {
         let phi = PI * x;
         Self { azimuth: [phi.cos(), phi.sin()], v: 1.0 - y * y, share: 2.0 * y / points as f64 }
@@ -162,7 +168,8 @@ static GRID: LazyLock<Vec<Point>> = LazyLock::new(|| {
     (0..POINTS * POINTS).map(|k| Point::spaced(at(k % POINTS), at(k / POINTS), POINTS * POINTS)).collect()
 });
 
-/// Points of a golden-ratio lattice, for integrands with an edge: no row of points lies along the edge.
+/// Points of a golden-ratio lattice, for integrands with an edge: no row of points lies along the
+/// edge.
 static LATTICE_POINTS: LazyLock<Vec<Point>> = LazyLock::new(|| {
     let at = |k: f64| Point::spaced(k / LATTICE as f64, (k * 0.618_033_988_749_894_9).fract(), LATTICE);
     (0..LATTICE).map(|k| at(k as f64 + 0.5)).collect()
@@ -214,7 +221,8 @@ impl Visible {
     }
 }
 
-/// Albedo of GGX microfacets with a Fresnel term of 1, and with Schlick's weight (1 - cos)^5 as the Fresnel term.
+/// Albedo of GGX microfacets with a Fresnel term of 1, and with Schlick's weight (1 - cos)^5 as the
+/// Fresnel term.
 fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     let visible = Visible::new(cos_o, roughness);
     let mut sum = [0.0; 2];
@@ -227,8 +235,9 @@ fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     sum
 }
 
-/// Albedos of GGX microfacets with a dielectric's Fresnel term F, `DIELECTRIC_*` of shaders/bsdf/albedo.glsl: total internal reflection;
-/// reflection below the critical angle; transmission with F = 0; the part of it that F removes. `eta`: index of refraction on the far
+/// Albedos of GGX microfacets with a dielectric's Fresnel term F, `DIELECTRIC_*` of
+/// shaders/bsdf/albedo.glsl: total internal reflection; reflection below the critical angle;
+/// transmission with F = 0; the part of it that F removes. `eta`: index of refraction on the far
 /// side over that on the side of wo.
 fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     let visible = Visible::new(cos_o, roughness);
@@ -249,7 +258,8 @@ fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     sum
 }
 
-/// Exact Fresnel term of a dielectric, and the cosine of the refracted direction: 0 for total internal reflection.
+/// Exact Fresnel term of a dielectric, and the cosine of the refracted direction: 0 for total
+/// internal reflection.
 fn fresnel(cos_i: f64, eta: f64) -> (f64, f64) {
     let sin2 = (1.0 - cos_i * cos_i) / (eta * eta);
     if sin2 >= 1.0 {
@@ -261,7 +271,8 @@ fn fresnel(cos_i: f64, eta: f64) -> (f64, f64) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), cos_t)
 }
 
-/// Albedo of Beckmann microfacets with the fit of Smith's term that shaders/bsdf/microfacet.glsl uses.
+/// Albedo of Beckmann microfacets with the fit of Smith's term that shaders/bsdf/microfacet.glsl
+/// uses.
 fn beckmann(cos_o: f64, roughness: f64) -> f64 {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
     let lambda = |c: f64| {
@@ -285,7 +296,8 @@ fn beckmann(cos_o: f64, roughness: f64) -> f64 {
         .sum()
 }
 
-/// Albedo of the Charlie sheen (shaders/bsdf/sheen.glsl): above 1 for low roughness at grazing angles, where the shader clamps it.
+/// Albedo of the Charlie sheen (shaders/bsdf/sheen.glsl): above 1 for low roughness at grazing
+/// angles, where the shader clamps it.
 fn charlie(cos_o: f64, roughness: f64) -> f64 {
     let (alpha, wo) = ((roughness * roughness).max(1e-3), direction(cos_o));
     let mix = |a: f64, b: f64| a + (b - a) * (1.0 - alpha).powi(2);
@@ -317,7 +329,8 @@ fn charlie(cos_o: f64, roughness: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Microfacets that are a mirror lose nothing; rough ones what the same integral over 400 x 400 points says.
+    /// Microfacets that are a mirror lose nothing; rough ones what the same integral over 400 x 400
+    /// points says.
     #[test]
     fn mirrors_lose_nothing_and_rough_ones_what_is_known() {
         let glass = |c, r, eta| {
@@ -336,7 +349,7 @@ mod tests {
         }
     }
 
-    /// What is weighted is less than the whole, and nothing reflects more than there is.
+    /// The weighted part is less than the whole, and nothing reflects more than there is.
     #[test]
     fn parts_are_no_more_than_the_whole() {
         for (c, r) in [(0.2, 0.3), (0.6, 0.8), (1.0, 0.5)] {
@@ -361,7 +374,8 @@ mod tests {
         }
     }
 
-    /// Tables as the shader reads them, between their entries, against integrals of many points: what compensation is off by.
+    /// Tables as the shader reads them, between their entries, against integrals of many points:
+    /// what compensation is off by.
     #[test]
     fn tables_hold_between_their_entries() {
         let tables = tables(AlbedoTables { ggx: true, sheen: true, beckmann: true }, &[]);

@@ -1,5 +1,5 @@
-//! The compute tracer's data without a BVH (`shaders/trace/brute.glsl`): primitives group by group, and for each
-//! instance the range of its primitives.
+//! The compute tracer's data without a BVH (`shaders/trace/brute.glsl`): primitives group by group,
+//! and for each instance the range of its primitives.
 
 use std::sync::Arc;
 

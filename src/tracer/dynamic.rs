@@ -1,8 +1,9 @@
 //! Dynamic scenes: instances move, meshes deform, the rest is static.
 //!
-//! What may change is declared when the scene is flattened ([`crate::scene::Motion`]); [`Tracer::update`] applies the changes. The compute
-//! tracer refits its BVHs on the host or rebuilds them (`dynamic_trees.rs`), the hardware tracers let the driver do so (`hardware.rs`). The
-//! tracer of a static scene has no such state.
+//! What may change is declared when the scene is flattened ([`crate::scene::Motion`]);
+//! [`Tracer::update`] applies the changes. The compute tracer refits its BVHs on the host or
+//! rebuilds them (`dynamic_trees.rs`), the hardware tracers let the driver do so (`hardware.rs`).
+//! The tracer of a static scene has no such state.
 
 use std::collections::HashMap;
 use std::time::Instant;
@@ -25,15 +26,16 @@ pub struct MeshChange<'a> {
     pub mesh: usize,
     /// Object-space positions, as many as the mesh has vertices. All finite.
     pub positions: &'a [Vec3],
-    /// Unit shading normals, one per vertex; `None` leaves them unchanged. Without effect where the mesh or the tracer has none.
+    /// Unit shading normals, one per vertex; `None` leaves them unchanged. Without effect where the
+    /// mesh or the tracer has none.
     pub normals: Option<&'a [Vec3]>,
 }
 
 /// Changes of a scene since the last update.
 #[derive(Clone, Debug, Default)]
 pub struct Changes<'a> {
-    /// Instances (indices into [`crate::scene::Scene::instances`]) and their new object-to-world transforms, in the file's world space. Of two
-    /// entries for one instance the last counts.
+    /// Instances (indices into [`crate::scene::Scene::instances`]) and their new object-to-world
+    /// transforms, in the file's world space. Of two entries for one instance the last counts.
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that have deformed.
     pub meshes: Vec<MeshChange<'a>>,
@@ -42,15 +44,17 @@ pub struct Changes<'a> {
 /// Bounds of an instance that moved or deformed in an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovedBounds {
-    /// World-space bounds of it before and after the update together, relative to the scene's origin.
+    /// World-space bounds of it before and after the update together, relative to the scene's
+    /// origin.
     pub bounds: Aabb,
-    /// Largest displacement of one of its points over half the diagonal of its bounds. At 1 and above, the positions before and
-    /// after the update need not overlap.
+    /// Largest displacement of one of its points over half the diagonal of its bounds. At 1 and
+    /// above, the positions before and after the update need not overlap.
     pub share: f32,
 }
 
 impl Pose {
-    /// The changes for a tracer whose scene was flattened with the animation's [`crate::scene::animation::AnimationRig::motion`].
+    /// The changes for a tracer whose scene was flattened with the animation's
+    /// [`crate::scene::animation::AnimationRig::motion`].
     pub fn changes(&self) -> Changes<'_> {
         fn mesh(posed: &PosedMesh) -> MeshChange<'_> {
             let shape = &posed.shape;
@@ -68,11 +72,13 @@ pub struct UpdateStats {
     pub mesh_seconds: f64,
     /// Seconds for the top level.
     pub top_seconds: f64,
-    /// Meshes whose BVH was rebuilt, as indices into [`crate::scene::Scene::meshes`]; the others were refitted.
+    /// Meshes whose BVH was rebuilt, as indices into [`crate::scene::Scene::meshes`]; the others
+    /// were refitted.
     pub rebuilt: Vec<usize>,
     /// The top level was rebuilt.
     pub top_rebuilt: bool,
-    /// Largest SAH cost of a deformed mesh's BVH relative to its cost when it was built (compute tracer; else 1).
+    /// Largest SAH cost of a deformed mesh's BVH relative to its cost when it was built (compute
+    /// tracer; else 1).
     pub growth: f64,
     /// Bounds of what moved or deformed.
     #[serde(skip)]
@@ -83,7 +89,7 @@ pub struct UpdateStats {
 struct DeformingMesh {
     /// `None` when no instance uses the mesh.
     group: Option<usize>,
-    /// Its current vertices, in object space.
+    /// Current vertices of the mesh, in object space.
     positions: Vec<Vec3>,
     normals: usize,
 }
@@ -121,8 +127,10 @@ impl Dynamic {
         })
     }
 
-    /// Checks that the changes were declared and are valid. Returns the TLAS instances that move, with their new transforms.
+    /// Checks that the changes were declared and are valid. Returns the TLAS instances that move,
+    /// with their new transforms.
     fn check(&self, changes: &Changes) -> Result<Vec<(usize, DAffine3)>> {
+        // meshes: declared as deforming, of the same size, and finite
         for change in &changes.meshes {
             let m = change.mesh;
             let Some(mesh) = self.meshes.get(&m) else {
@@ -147,6 +155,8 @@ impl Dynamic {
                 }
             }
         }
+
+        // instances: declared as moving, with transforms that can be inverted
         let mut moved = Vec::with_capacity(changes.instances.len());
         for &(i, object_to_world) in &changes.instances {
             let Some(&entry) = self.entries.get(&i) else {
@@ -179,8 +189,8 @@ fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
 }
 
 impl Dynamic {
-    /// Applies the changes to the host-side state and returns the bounds of what moved. Instances whose transform and vertices are
-    /// unchanged are left out.
+    /// Applies the changes to the host-side state and returns the bounds of what moved. Instances
+    /// whose transform and vertices are unchanged are left out.
     fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<MovedBounds> {
         // bounds before the update and largest displacement of the deformed groups, in group space
         let mut ways: HashMap<usize, (Aabb, f32)> = HashMap::new();
@@ -228,23 +238,29 @@ fn corners(b: Aabb) -> impl Iterator<Item = DVec3> {
 }
 
 impl Tracer {
-    /// Applies changes of the scene. Ids in hits, streams and [`Tracer::scene_address`] stay valid; no stream may be running
-    /// meanwhile. The origin stays where it was: a scene that moves far away from it loses precision.
+    /// Applies changes of the scene. Ids in hits, streams and [`Tracer::scene_address`] stay valid;
+    /// no stream may be running meanwhile. The origin stays where it was: a scene that moves far
+    /// away from it loses precision.
     ///
     /// # Errors
-    /// [`Error::Usage`] when a change was not declared in [`crate::scene::Motion`]; [`Error::Scene`] for numbers that are not finite,
-    /// wrong counts and transforms that cannot be inverted. These two leave the tracer unchanged. After [`Error::OutOfMemory`],
+    /// [`Error::Usage`] when a change was not declared in [`crate::scene::Motion`];
+    /// [`Error::Scene`] for numbers that are not finite, wrong counts and transforms that cannot be
+    /// inverted. These two leave the tracer unchanged. After [`Error::OutOfMemory`],
     /// [`Error::Vulkan`] and [`Error::DeviceLost`] the tracer must not be used any more.
     pub fn update(&mut self, changes: &Changes) -> Result<UpdateStats> {
         let Some(dynamic) = &mut self.dynamic else {
             return Err(Error::Usage("this tracer's scene is static: use FlatScene::with_motion".into()));
         };
         let moved = dynamic.check(changes)?;
+
+        // the frame that was shown becomes the previous one, for motion vectors
         let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
         let start = Instant::now();
         let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
         self.scene.begin_update(&dynamic.instances, moved.iter().map(|m| m.0).collect(), deforming)?;
         stats.moved = dynamic.advance(changes, &moved);
+
+        // vertices, then the trees over them: refitted, or built anew
         let mut deformed = false;
         for change in &changes.meshes {
             if let Some(normals) = change.normals {
@@ -263,6 +279,8 @@ impl Tracer {
             deformed = true;
         }
         stats.mesh_seconds = start.elapsed().as_secs_f64();
+
+        // the top level, above what has changed
         if !deformed && moved.is_empty() {
             return Ok(stats);
         }
@@ -283,8 +301,9 @@ impl Tracer {
         Ok(stats)
     }
 
-    /// Reports the device time of tracing since the last update, in seconds, from which the next update decides between refitting and
-    /// rebuilding ([`crate::accel::RefitPolicy`]). Without effect for a static scene.
+    /// Reports the device time of tracing since the last update, in seconds, from which the next
+    /// update decides between refitting and rebuilding ([`crate::accel::RefitPolicy`]). Without
+    /// effect for a static scene.
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {

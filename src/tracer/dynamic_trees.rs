@@ -1,8 +1,10 @@
-//! The fast kernel's BVHs of a dynamic scene, refitted and rebuilt on the host. On a device with unified memory they are changed in
-//! place; on others the host keeps a copy and uploads the ranges that changed.
+//! The fast kernel's BVHs of a dynamic scene, refitted and rebuilt on the host. On a device with
+//! unified memory they are changed in place; on others the host keeps a copy and uploads the ranges
+//! that changed.
 //!
-//! Each tree has spare capacity in the array of blocks, and the kernel's stack has spare entries, so that streams are compiled once. A
-//! tree that outgrows its capacity causes a reallocation of the array; a tree that would be too deep for the stack is made shallower.
+//! Each tree has spare capacity in the array of blocks, and the kernel's stack has spare entries,
+//! so that streams are compiled once. A tree that outgrows its capacity causes a reallocation of
+//! the array; a tree that would be too deep for the stack is made shallower.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -24,7 +26,8 @@ use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleLeaf};
 use crate::scene::Geometry;
 
-/// Maximum number of TLAS instances for which the top level is always rebuilt: docs/dynamic-scenes.md has the measurement.
+/// Maximum number of TLAS instances for which the top level is always rebuilt:
+/// docs/dynamic-scenes.md has the measurement.
 const MAX_TOP_REBUILD: usize = 256;
 /// Number of levels by which a rebuilt tree may be deeper than the first one.
 const SPARE_LEVELS: u32 = 4;
@@ -101,10 +104,13 @@ fn may_deform(flat: &FlatScene) -> Vec<bool> {
 pub(super) fn reserve(trees: &Trees, flat: &FlatScene) -> (TreeCapacities, TreeDepths) {
     let deform = may_deform(flat);
     let capacity_of = |t: &WideBvh, more: bool| if more { spare_capacity(t.blocks.len()) } else { t.blocks.len() };
-    let top = trees.top.as_ref().map_or((0, 0), |t| match flat.motion.is_none() {
-        true => (t.blocks.len(), t.depth),
-        // every node but the root has at least two children
-        false => (2 * flat.instances.len() + 1, max_depth(t.depth, flat.instances.len())),
+    let top = trees.top.as_ref().map_or((0, 0), |t| {
+        if flat.motion.is_none() {
+            (t.blocks.len(), t.depth)
+        } else {
+            // every node but the root has at least two children
+            (2 * flat.instances.len() + 1, max_depth(t.depth, flat.instances.len()))
+        }
     });
     let groups = trees
         .groups
@@ -158,8 +164,8 @@ impl DynamicTrees {
         Ok(())
     }
 
-    /// Refits the tree of a deformed group, or rebuilds it when the policy decides so. Returns whether it was rebuilt, and its SAH cost
-    /// relative to that at the last build.
+    /// Refits the tree of a deformed group, or rebuilds it when the policy decides so. Returns
+    /// whether it was rebuilt, and its SAH cost relative to that at the last build.
     pub fn deform(
         &mut self,
         device: &Arc<Device>,
@@ -193,8 +199,8 @@ impl DynamicTrees {
         Ok((false, self.groups[group].growth()))
     }
 
-    /// Refits or rebuilds the top level after instances have moved or groups have deformed. Returns whether it was rebuilt, and the bounds
-    /// of the scene.
+    /// Refits or rebuilds the top level after instances have moved or groups have deformed. Returns
+    /// whether it was rebuilt, and the bounds of the scene.
     pub fn place(&mut self, nodes: &mut Buffer, instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
         let Some(top) = &mut self.top else {
             return Ok((false, self.groups.first().map_or(Aabb::EMPTY, |g| g.bounds)));
@@ -228,7 +234,8 @@ impl DynamicTrees {
         Ok((rebuild, bounds))
     }
 
-    /// Distributes the time of tracing over the trees, by the expected number of blocks of each that a ray visits.
+    /// Distributes the time of tracing over the trees, by the expected number of blocks of each
+    /// that a ray visits.
     pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         let mut visits = vec![0.0f64; self.groups.len()];
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
@@ -341,8 +348,9 @@ pub(super) fn instance_leaf(entry: u32, instance: &TlasInstance, root: u32) -> I
     InstanceLeaf { world_to_group: rows(&instance.to_world.inverse()), root, instance: entry, ..Default::default() }
 }
 
-/// Updates the corners of a leaf to the current vertices and returns their bounds. The vertex of each corner follows from the leaf's
-/// triangle indices and its corner order, as the shader reads them.
+/// Updates the corners of a leaf to the current vertices and returns their bounds. The vertex of
+/// each corner follows from the leaf's triangle indices and its corner order, as the shader reads
+/// them.
 fn rewrite_pair(block: &mut Block, positions: &[Vec3], indices: &[[u32; 3]]) -> Aabb {
     let places = |word: u32| [word as usize & 3, word as usize >> 2 & 3];
     let leaf: &mut TriangleLeaf = bytemuck::cast_mut(block);

@@ -1,6 +1,7 @@
-//! Entry points of camera rays: per bundle of 2x2 pixels a short list of blocks of the hierarchy, at which the packet kernel starts instead of at the root
-//! (shaders/entry_points.glsl). A pass writes the lists of a launch; they pay where a launch has several samples of each pixel, because packets of one bundle visit the same
-//! upper levels again and again.
+//! Entry points of camera rays: per bundle of 2x2 pixels a short list of blocks of the hierarchy,
+//! at which the packet kernel starts instead of at the root (shaders/entry_points.glsl). A pass
+//! writes the lists of a launch; they pay where a launch has several samples of each pixel, because
+//! packets of one bundle visit the same upper levels again and again.
 
 use super::{Push, Stream, Tracer};
 use crate::error::Result;
@@ -17,9 +18,11 @@ pub struct EntryPoints {
 }
 
 impl EntryPoints {
-    /// Entry points for the camera rays of `stream`, at most `rays` in a launch and at most 2^`sample_bits` of a pixel. They are for rays that start at one point, as those of a
-    /// perspective camera do. `None` where they do not apply: only the packet kernel has them, and packets must be within bundles. On GPUs they are not measured, and Mesa's CPU driver
-    /// before version 23 loses hits.
+    /// Entry points for the camera rays of `stream`, at most `rays` in a launch and at most
+    /// 2^`sample_bits` of a pixel. They are for rays that start at one point, as those of a
+    /// perspective camera do. `None` where they do not apply: only the packet kernel has them, and
+    /// packets must be within bundles. On GPUs they are not measured, and Mesa's CPU driver before
+    /// version 23 loses hits.
     ///
     /// # Errors
     /// Those of the device.
@@ -43,7 +46,8 @@ impl EntryPoints {
         self.lists.address()
     }
 
-    /// Records the pass for a launch of camera rays. The shaders ignore the lists in launches of fewer samples. Commands before and after it need a barrier in between.
+    /// Records the pass for a launch of camera rays. The shaders ignore the lists in launches of
+    /// fewer samples. Commands before and after it need a barrier in between.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         if push.sample_bits >= self.sample_bits && push.count > 0 {
             let bundles = (push.count >> (push.sample_bits + BUNDLE_BITS)) + 2;

@@ -1,4 +1,5 @@
-//! The acceleration structures of the hardware tracers: one bottom level per group, and one top level.
+//! The acceleration structures of the hardware tracers: one bottom level per group, and one top
+//! level.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -40,8 +41,8 @@ struct Deforming {
     opaque: u32,
     alpha_tested: u32,
     policy: RefitPolicy,
-    /// Seconds of the first trace after it was built. A driver does not report the quality of its BVH, so later traces are compared
-    /// with this one.
+    /// Seconds of the first trace after it was built. A driver does not report the quality of its
+    /// BVH, so later traces are compared with this one.
     first_trace: Option<f64>,
 }
 
@@ -60,6 +61,7 @@ impl Deforming {
 
 impl Structures {
     pub fn build(device: &Arc<Device>, flat: &FlatScene, scene: &GpuScene) -> Result<Self> {
+        // deforming groups keep what a later refit needs
         let mut commands = Commands::new(device)?;
         let mut bottom = Vec::with_capacity(flat.groups.len());
         let mut deforming: Vec<Option<Deforming>> = flat.groups.iter().map(|_| None).collect();
@@ -73,6 +75,8 @@ impl Structures {
                 first_trace: None,
             });
         }
+
+        // bottom levels: those that deform can be updated, the others are compacted
         for ((group, buffers), deforming) in flat.groups.iter().zip(&scene.groups).zip(&mut deforming) {
             if let Some(d) = deforming {
                 let start = Instant::now();
@@ -97,6 +101,8 @@ impl Structures {
             };
             bottom.push(AccelerationStructure::bottom_level(device, &mut commands, "bottom level", &input)?);
         }
+
+        // the top level: instances with their hit groups
         let entries: Vec<_> = flat
             .instances
             .iter()
@@ -118,7 +124,8 @@ impl Structures {
         Ok(Self { bottom, top, changing })
     }
 
-    /// Refits the bottom level of a deformed group, or rebuilds it when the policy decides so. Returns whether it was rebuilt.
+    /// Refits the bottom level of a deformed group, or rebuilds it when the policy decides so.
+    /// Returns whether it was rebuilt.
     pub fn deform(&mut self, device: &Arc<Device>, group: usize, scene: &GpuScene) -> Result<bool> {
         let Some(d) = self.changing.as_mut().and_then(|c| c.deforming[group].as_mut()) else { return Ok(false) };
         let start = Instant::now();
@@ -144,8 +151,8 @@ impl Structures {
         self.top.rebuild_top_level(&mut Commands::new(device)?, &changing.entries)
     }
 
-    /// Records that tracing took `seconds` since the last update. An increase over the first trace is attributed to the loss of quality by
-    /// refitting, in all deforming structures alike.
+    /// Records that tracing took `seconds` since the last update. An increase over the first trace
+    /// is attributed to the loss of quality by refitting, in all deforming structures alike.
     pub fn traced(&mut self, seconds: f64) {
         let Some(changing) = &mut self.changing else { return };
         for d in changing.deforming.iter_mut().flatten() {

@@ -26,17 +26,20 @@ choices! {
 }
 
 impl Kernel {
-    /// Maximum number of intersection tests per ray for [`Kernel::Brute`] (see [`Kernel::brute_tests`]). Mesa before 23 leaves
-    /// a loop after 65,535 iterations, and even a small launch should not occupy a device for long.
+    /// Maximum number of intersection tests per ray for [`Kernel::Brute`] (see
+    /// [`Kernel::brute_tests`]). Mesa before 23 leaves a loop after 65,535 iterations, and even a
+    /// small launch should not occupy a device for long.
     pub const MAX_BRUTE_TESTS: usize = 40_000;
 
-    /// Number of tests that [`Kernel::Brute`] does for each ray: the instances, and the primitives of each.
+    /// Number of tests that [`Kernel::Brute`] does for each ray: the instances, and the primitives
+    /// of each.
     pub fn brute_tests(flat: &FlatScene) -> usize {
         flat.instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
     }
 
-    /// The kernel for coherent streams on a device. A packet's loop has many more iterations than a single ray's, without a bound: on
-    /// drivers that end long loops early, packets run only when requested.
+    /// The kernel for coherent streams on a device. A packet's loop has many more iterations than a
+    /// single ray's, without a bound: on drivers that end long loops early, packets run only when
+    /// requested.
     pub fn for_coherent(self, info: &DeviceInfo) -> Kernel {
         match self {
             Kernel::Auto if info.packets() && !info.cuts_long_loops() => Kernel::Packet,
@@ -62,7 +65,7 @@ choices! {
 pub struct ComputeOptions {
     /// The kernel.
     pub kernel: Kernel,
-    /// Its triangle test.
+    /// Triangle test of the kernel.
     pub triangle_test: TriangleTest,
 }
 
@@ -75,7 +78,8 @@ pub struct BuildOptions {
     pub rays: u64,
     /// Cache of built hierarchies, used for those of the wide kernel only; `None` caches nothing.
     pub cache: Option<Cache>,
-    /// Streams that will be requested with [`super::Tracer::stream`]; for large scenes they are compiled while the BVH is built.
+    /// Streams that will be requested with [`super::Tracer::stream`]; for large scenes they are
+    /// compiled while the BVH is built.
     pub streams: Vec<&'static StreamShaders>,
 }
 

@@ -75,10 +75,11 @@ impl std::fmt::Display for TracerKind {
 /// Requirements of a tracer on a device.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TracerNeeds {
-    /// Which tracer.
+    /// The tracer.
     pub tracer: TracerKind,
     /// Required extensions and features.
     pub needs: Vec<String>,
-    /// Those that the device lacks. When empty, the tracer runs if the device has skylit's minimum requirements.
+    /// Requirements that the device lacks. When empty, the tracer runs if the device has skylit's
+    /// minimum requirements.
     pub missing: Vec<String>,
 }

@@ -1,4 +1,5 @@
-//! Mip levels of textures, for footprints wider than a texel: made on the host, and only when required.
+//! Mip levels of textures, for footprints wider than a texel: made on the host, and only when
+//! required.
 
 use std::ops::Range;
 
@@ -27,8 +28,9 @@ fn levels(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     halves.skip(1).take(MAX_LEVELS as usize)
 }
 
-/// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four numbers of 16 bits a texel, to 2^-17, or four floats
-/// where the texture has more than 8 bits itself.
+/// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four
+/// numbers of 16 bits a texel, to 2^-17, or four floats where the texture has more than 8 bits
+/// itself.
 pub(super) fn pyramid(texture: &Texture, texels: Texels) -> Vec<u8> {
     let levels = means(texture, texels);
     match texture.texels {
@@ -41,7 +43,8 @@ fn unorm16(texel: &Vec4) -> [u16; 4] {
     texel.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0).round() as u16)
 }
 
-/// The texels of all levels from 1 on, each the mean of the texels that it covers in the level before.
+/// The texels of all levels from 1 on, each the mean of the texels that it covers in the level
+/// before.
 fn means(texture: &Texture, texels: Texels) -> Vec<Vec4> {
     let texel = |i: usize| {
         let c = Vec4::from_array(if texels == Texels::Linear { texture.texels.get(i) } else { texture.texels.decode_srgb(i) });
@@ -51,17 +54,15 @@ fn means(texture: &Texture, texels: Texels) -> Vec<Vec4> {
     let mut before = [texture.width, texture.height];
     let mut means: Vec<Vec4> = Vec::new();
     for size in levels(before) {
-        means = match means.is_empty() {
-            true => reduced(before, size, texel),
-            false => reduced(before, size, |i| means[i]),
-        };
+        means = if means.is_empty() { reduced(before, size, texel) } else { reduced(before, size, |i| means[i]) };
         out.extend_from_slice(&means);
         before = size;
     }
     out
 }
 
-/// Means of a smaller image's texels over what they cover, with texels that are covered in part counted in part.
+/// Means of a smaller image's texels over what they cover, with texels that are covered in part
+/// counted in part.
 fn reduced(from: [u32; 2], to: [u32; 2], texel: impl Fn(usize) -> Vec4 + Sync) -> Vec<Vec4> {
     let [columns, rows] = [0, 1].map(|k| (0..to[k]).map(|i| Taps::new(i, from[k], to[k])).collect::<Vec<_>>());
     let mut out = vec![Vec4::ZERO; rows.len() * columns.len()];

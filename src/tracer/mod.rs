@@ -1,9 +1,10 @@
-//! The interface between passes and tracers: a pass describes a stream of rays, a tracer traces it. Nothing outside this folder knows
-//! which tracer is used.
+//! The interface between passes and tracers: a pass describes a stream of rays, a tracer traces it.
+//! Nothing outside this folder knows which tracer is used.
 //!
-//! A pass's shader defines `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
-//! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) and its acceleration structures:
-//! a software BVH (`compute`) or those of VK_KHR_acceleration_structure (`hardware`).
+//! A pass's shader defines `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles
+//! it once per tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) and
+//! its acceleration structures: a software BVH (`compute`) or those of
+//! VK_KHR_acceleration_structure (`hardware`).
 
 mod albedo;
 mod attributes;
@@ -66,19 +67,23 @@ pub struct BuildStats {
     pub build_seconds: f64,
     /// Seconds to write the scene into device memory.
     pub upload_seconds: f64,
-    /// Size of the acceleration structures in bytes: BVH nodes and primitives, or the driver's structures.
+    /// Size of the acceleration structures in bytes: BVH nodes and primitives, or the driver's
+    /// structures.
     pub structure_bytes: u64,
     /// Size of the rest of the scene in bytes: vertices, indices, attributes, textures, records.
     pub scene_bytes: u64,
-    /// Size of mip levels 1 and up in bytes, included in `scene_bytes`; 0 without [`Needs::mip_levels`].
+    /// Size of mip levels 1 and up in bytes, included in `scene_bytes`; 0 without
+    /// [`Needs::mip_levels`].
     pub mip_bytes: u64,
-    /// Largest number of mip levels of a texture, level 0 included; 0 without [`Needs::mip_levels`].
+    /// Largest number of mip levels of a texture, level 0 included; 0 without
+    /// [`Needs::mip_levels`].
     pub mip_levels: u32,
     /// Number of triangles and spheres in the structures (each BLAS counted once).
     pub primitives: u64,
     /// Capacity of the compute tracer's traversal stack, in entries; 0 for the hardware tracers.
     pub stack_entries: u32,
-    /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for scenes of several trees.
+    /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for
+    /// scenes of several trees.
     pub sah_cost: Option<f64>,
 }
 
@@ -118,18 +123,19 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Uploads a scene and builds the acceleration structures of `kind`. A scene that was flattened with [`crate::scene::Motion`]
-    /// can be updated ([`Tracer::update`]).
+    /// Uploads a scene and builds the acceleration structures of `kind`. A scene that was flattened
+    /// with [`crate::scene::Motion`] can be updated ([`Tracer::update`]).
     ///
     /// # Errors
-    /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
-    /// the scene has more primitives than the tracer's indices reach.
+    /// [`Error::Device`] when the device lacks what the tracer needs, naming it;
+    /// [`Error::OutOfMemory`]; [`Error::Scene`] when the scene has more primitives than the
+    /// tracer's indices reach.
     pub fn new(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs) -> Result<Self> {
         Self::with_options(device, kind, flat, needs, ComputeOptions::default())
     }
 
-    /// As [`Tracer::new`], with options of the compute tracer: a [`Kernel`] or [`ComputeOptions`]. The hardware
-    /// tracers ignore them.
+    /// As [`Tracer::new`], with options of the compute tracer: a [`Kernel`] or [`ComputeOptions`].
+    /// The hardware tracers ignore them.
     pub fn with_options(
         device: &Arc<Device>,
         kind: TracerKind,
@@ -156,10 +162,14 @@ impl Tracer {
                 device.info.name, device.info.driver
             )));
         }
+
+        // what the scene uses decides which kernels are compiled
         let shading = needs.shading.then(|| shading::features(flat, needs));
-        let features = SceneFeatures { shading, ..SceneFeatures::of(flat) };
+        let features = SceneFeatures { shading, ..SceneFeatures::from_flat(flat) };
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
-        // the BVH first: its build needs the most host memory, which is freed before the scene's buffers are filled
+
+        // the BVH first: its build needs the most host memory, which is freed before the scene's
+        // buffers are filled
         let start = Instant::now();
         let (hierarchy, prepared) = match kind {
             TracerKind::Compute => {
@@ -181,6 +191,8 @@ impl Tracer {
             _ => (None, PrecompiledPipelines::default()),
         };
         let start = Instant::now();
+
+        // then the scene's buffers, and the structure in device memory
         let mut scene = GpuScene::new(device, flat, needs)?;
         let structure = match hierarchy {
             Some(trees) => {
@@ -202,6 +214,8 @@ impl Tracer {
                 Structure::Hardware { levels: Box::new(s) }
             }
         };
+
+        // the hardware tracers build on the device, so that they measured both already
         if kind == TracerKind::Compute {
             stats.upload_seconds = start.elapsed().as_secs_f64();
         }
@@ -261,10 +275,12 @@ impl Tracer {
         self.scene.root_address()
     }
 
-    /// Checks that every ray was traced to its end. Call it after streams have run and before their results are used.
+    /// Checks that every ray was traced to its end. Call it after streams have run and before their
+    /// results are used.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] when the driver ended a traversal loop early; the results alone do not show it.
+    /// [`Error::Vulkan`] when the driver ended a traversal loop early; the results alone do not
+    /// show it.
     pub fn check_finished(&self) -> Result<()> {
         match &self.structure {
             Structure::Compute(h) => h.check_finished(),
@@ -288,7 +304,8 @@ impl Tracer {
         self.kept(shaders, constants, false, || self.compile(shaders, constants))
     }
 
-    /// As [`Tracer::specialized`], for rays that another pass has traced: the shader reads the hits ([`crate::shaders::Rays::CameraOrKnown`]).
+    /// As [`Tracer::specialized`], for rays that another pass has traced: the shader reads the hits
+    /// ([`crate::shaders::Rays::CameraOrKnown`]).
     ///
     /// # Errors
     /// Those of the device.
@@ -345,8 +362,9 @@ impl Tracer {
         }
     }
 
-    /// Compiles a compute pass that traverses the compute tracer's BVH with the code of the `wide` kernel and counts visited nodes
-    /// (`COUNT_VISITS` in shaders/trace/wide.glsl). `user` is the option that needs it, for error messages.
+    /// Compiles a compute pass that traverses the compute tracer's BVH with the code of the `wide`
+    /// kernel and counts visited nodes (`COUNT_VISITS` in shaders/trace/wide.glsl). `user` is the
+    /// option that needs it, for error messages.
     ///
     /// # Errors
     /// [`Error::Usage`] for tracers and traversals that cannot count, and those of the device.
@@ -363,7 +381,8 @@ impl Tracer {
         }
     }
 
-    /// Compiles a stream of camera rays whose hits come from rasterized pixels ([`crate::raster`]): nothing is traced.
+    /// Compiles a stream of camera rays whose hits come from rasterized pixels ([`crate::raster`]):
+    /// nothing is traced.
     pub fn rasterized_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
         Stream::rasterized(&self.device, shaders, &stream::scene_specialization(self.features))
     }

@@ -1,5 +1,5 @@
-//! The compute tracer's large pipelines, compiled while its BVH is built: a driver takes a tenth of a second for each, and half
-//! a second without a cached result.
+//! The compute tracer's large pipelines, compiled while its BVH is built: a driver takes a tenth of
+//! a second for each, and half a second without a cached result.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,7 +12,8 @@ use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::interface::constants;
 use crate::shaders::{Shader, StreamShaders, Variant, wide_kernel};
 
-/// Minimum number of primitives for compiling ahead: the BVH of a smaller scene is built sooner than a pipeline is compiled.
+/// Minimum number of primitives for compiling ahead: the BVH of a smaller scene is built sooner
+/// than a pipeline is compiled.
 const MIN_PRIMITIVES: usize = 100_000;
 
 /// A shader and its specialization.
@@ -32,8 +33,9 @@ pub(super) struct PrecompiledPipelines {
 }
 
 impl PrecompiledPipelines {
-    /// The pipelines that the streams of a scene are expected to need. One that differs from its expectation is compiled when it is first
-    /// used; an error in compiling ahead is ignored, since it occurs again then.
+    /// The pipelines that the streams of a scene are expected to need. One that differs from its
+    /// expectation is compiled when it is first used; an error in compiling ahead is ignored, since
+    /// it occurs again then.
     pub fn expected(
         info: &DeviceInfo,
         features: SceneFeatures,

@@ -1,5 +1,5 @@
-//! Transforms and vertices of a dynamic scene before the last update, in device memory: shaders compute motion vectors from them.
-//! Static scenes have none.
+//! Transforms and vertices of a dynamic scene before the last update, in device memory: shaders
+//! compute motion vectors from them. Static scenes have none.
 
 use std::sync::Arc;
 
@@ -50,7 +50,8 @@ impl PreviousFrame {
         self.buffer.address()
     }
 
-    /// Makes the current state the previous one. To be called before an update that moves these instances and deforms these groups.
+    /// Makes the current state the previous one. To be called before an update that moves these
+    /// instances and deforms these groups.
     pub fn begin<'a>(
         &mut self,
         instances: &[TlasInstance],

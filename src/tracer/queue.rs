@@ -1,6 +1,8 @@
-//! Queues of rays in device memory: one pass appends rays (`append_ray` of shaders/common/queue.glsl), a later stream traces them.
-//! Their number is known on the device only: a stream over a queue gets its address ([`Push::queued`]), and work-groups
-//! beyond it return at once. The order of the rays differs from run to run, so a result is stored by the tag of its ray.
+//! Queues of rays in device memory: one pass appends rays (`append_ray` of
+//! shaders/common/queue.glsl), a later stream traces them. Their number is known on the device
+//! only: a stream over a queue gets its address ([`Push::queued`]), and work-groups beyond it
+//! return at once. The order of the rays differs from run to run, so a result is stored by the tag
+//! of its ray.
 
 use std::sync::Arc;
 
@@ -47,8 +49,8 @@ impl RayQueue {
         &self.count
     }
 
-    /// `push` for a stream that traces the queued rays, at most `max_rays`. The pass that fills the queue must not append more than
-    /// that.
+    /// `push` for a stream that traces the queued rays, at most `max_rays`. The pass that fills the
+    /// queue must not append more than that.
     pub fn push(&self, push: Push, max_rays: u32) -> Push {
         assert!(max_rays <= self.capacity);
         Push { rays: self.rays.address(), queued: self.count.address(), first: 0, count: max_rays, ..push }

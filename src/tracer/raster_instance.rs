@@ -1,4 +1,5 @@
-//! The geometry of a scene in device memory for a rasterizer: buffer addresses, and bounds for frustum culling.
+//! The geometry of a scene in device memory for a rasterizer: buffer addresses, and bounds for
+//! frustum culling.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -19,7 +20,8 @@ pub struct RasterGeometry {
     pub opaque: u32,
     /// Bounds of all primitives, in group space.
     pub bounds: Aabb,
-    /// Bounds of each run of [`CHUNK`] primitives; empty for a single run, and after vertices have moved.
+    /// Bounds of each run of [`CHUNK`] primitives; empty for a single run, and after vertices have
+    /// moved.
     pub chunks: Vec<Aabb>,
 }
 
@@ -29,7 +31,7 @@ pub struct RasterInstance<'a> {
     pub entry: u32,
     /// Group space to world relative to the scene's origin: three rows.
     pub to_world: [[f32; 4]; 3],
-    /// Its geometry.
+    /// Geometry of the instance.
     pub shape: &'a RasterGeometry,
     /// Device address of its vertices, 3 floats each, or of its spheres, 4 floats each.
     pub positions: u64,

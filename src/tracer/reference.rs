@@ -1,5 +1,5 @@
-//! The binary BVHs of the compute tracer's simple kernel (`shaders/trace/reference.glsl`): one per group and one over the
-//! instances, in one node array.
+//! The binary BVHs of the compute tracer's simple kernel (`shaders/trace/reference.glsl`): one per
+//! group and one over the instances, in one node array.
 
 use std::sync::Arc;
 
@@ -35,7 +35,8 @@ impl Trees {
         let mut top = None;
         if !flat.is_single_level() {
             bounds = instance_boxes(flat, &bounds);
-            // a leaf of the top level holds one instance, because traversal continues in the instance's own BVH
+            // a leaf of the top level holds one instance, because traversal continues in the
+            // instance's own BVH
             top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
         }
         Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }

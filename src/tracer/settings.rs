@@ -124,8 +124,8 @@ impl DeviceSettings {
     /// Checks the combination of options: none may be given that would have no effect.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an option of the compute tracer with another tracer, and for a build or cache option with a
-    /// traversal that has no BVH or does not cache it.
+    /// [`Error::Usage`] for an option of the compute tracer with another tracer, and for a build or
+    /// cache option with a traversal that has no BVH or does not cache it.
     pub fn check(&self) -> Result<()> {
         if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) = (self.tracer, self.compute_only_option()) {
             return Err(Error::Usage(format!(
@@ -146,8 +146,8 @@ impl DeviceSettings {
         }
     }
 
-    /// The tracer on a device, the reason for it, and the options of the compute tracer. An option that applies to the compute tracer
-    /// only chooses it unless `--tracer` is given.
+    /// The tracer on a device, the reason for it, and the options of the compute tracer. An option
+    /// that applies to the compute tracer only chooses it unless `--tracer` is given.
     ///
     /// # Errors
     /// Those of [`DeviceSettings::check`].

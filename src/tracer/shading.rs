@@ -1,4 +1,5 @@
-//! Materials for the path tracer: their [`ShadingRecord`], and the shader features that the scene requires.
+//! Materials for the path tracer: their [`ShadingRecord`], and the shader features that the scene
+//! requires.
 
 use super::needs::Needs;
 use crate::accel::flatten::FlatScene;
@@ -14,11 +15,13 @@ use crate::scene::{Geometry, Material, TextureSlot};
 // shaders/path/shading.glsl loads the first four words together
 const _: () = assert!(std::mem::offset_of!(ShadingRecord, emission) == 0 && std::mem::offset_of!(ShadingRecord, model) == 12);
 
-/// Number of textures of a material beside that of the base colour, in the order of [`TextureFeature`].
+/// Number of textures of a material beside that of the base colour, in the order of
+/// [`TextureFeature`].
 pub(super) const SLOTS: usize = TextureFeature::ALL.len();
 
-/// Complex index of refraction of a conductor at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
-/// Mitsuba and pbrt carry them, integrated to linear sRGB.
+/// Complex index of refraction of a conductor at the wavelengths of sRGB's primaries: eta and k of
+/// the measurements of Palik's handbook (1985) as Mitsuba and pbrt carry them, integrated to linear
+/// sRGB.
 fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
     match kind {
         MaterialKind::Copper => Some([[0.200_438, 0.924_033, 1.102_212], [3.912_949, 2.452_848, 2.142_188]]),
@@ -103,7 +106,8 @@ impl TextureFeature {
 fn walls(m: &Material) -> TransmissionMode {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
-            // glTF's index of refraction 0 does not refract: such a material transmits straight on, as a thin wall
+            // glTF's index of refraction 0 does not refract: such a material transmits straight on,
+            // as a thin wall
             if m.transmission.thickness > 0.0 && m.ior != 0.0 { TransmissionMode::Volume } else { TransmissionMode::Thin }
         }
         _ => TransmissionMode::Opaque,
@@ -120,7 +124,8 @@ pub(crate) fn absorbs(m: &Material) -> bool {
     absorption(m).iter().any(|&a| a > 0.0)
 }
 
-/// Whether light may pass straight through: a thin wall that is smooth, or that a roughness texture may make smooth.
+/// Whether light may pass straight through: a thin wall that is smooth, or that a roughness texture
+/// may make smooth.
 pub(crate) fn has_clear_walls(m: &Material) -> bool {
     walls(m) == TransmissionMode::Thin && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
 }
@@ -135,7 +140,8 @@ fn absorption(m: &Material) -> [f32; 3] {
     m.transmission.attenuation_color.to_array().map(per_unit)
 }
 
-/// The distinct indices of refraction of all refracting materials: each has an albedo table ([`super::albedo`]).
+/// The distinct indices of refraction of all refracting materials: each has an albedo table
+/// ([`super::albedo`]).
 pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
     let mut all: Vec<f32> = materials.iter().filter(|m| refracts(m)).map(|m| m.ior).collect();
     all.sort_by(f32::total_cmp);
@@ -156,6 +162,8 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     materials.insert_if(needs.compensation, MaterialFeature::Compensation);
     materials.insert_if(needs.white, MaterialFeature::White);
     materials.insert_if(needs.mip_levels && !needs.white, MaterialFeature::RayCones);
+
+    // features that some visible surface uses
     for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];
@@ -169,6 +177,8 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             Some(model) => bsdfs.insert(model),
             None => materials.insert(MaterialFeature::Unlit),
         }
+
+        // a feature is compiled in only if a material needs it
         let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
         let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
         let varies = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
@@ -201,6 +211,7 @@ pub(super) fn record(
     texture: impl Fn(Option<TextureSlot>) -> TextureUse,
 ) -> ShadingRecord {
     let metal = metal(m.kind);
+
     // the colour of a conductor is in its index of refraction already
     let tint = if metal.is_some() { [1.0; 3] } else { m.specular_color.to_array() };
     let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };

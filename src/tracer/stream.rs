@@ -14,16 +14,19 @@ use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamSh
 /// Number of rays that a launch may have on every device.
 pub const LAUNCH_RAYS: u32 = 1 << 19;
 
-/// Memory of a GPU in bytes from which launches are larger: rays and states of paths are about 250 bytes each.
+/// Memory of a GPU in bytes from which launches are larger: rays and states of paths are about 250
+/// bytes each.
 const MEMORY_OF_LARGE_LAUNCHES: u64 = 6 << 30;
 
-/// Maximum number of rays in a launch of films and frames on a device; the compute tracer's ray and hit buffers have room for [`with_uncovered`] as many. Between the steps of a launch a GPU is
+/// Maximum number of rays in a launch of films and frames on a device; the compute tracer's ray and
+/// hit buffers have room for [`with_uncovered`] as many. Between the steps of a launch a GPU is
 /// idle for a tenth of a millisecond, longer than it takes for half a million rays.
 pub fn launch_rays(info: &DeviceInfo) -> u32 {
     if info.is_cpu() || info.limits.device_memory < MEMORY_OF_LARGE_LAUNCHES { LAUNCH_RAYS } else { 4 * LAUNCH_RAYS }
 }
 
-/// All paths of surfaces in a frame over those that uncovered pixels have besides, in the same launch: what a frame costs stays the same where much is uncovered.
+/// All paths of surfaces in a frame over those that uncovered pixels have besides, in the same
+/// launch: what a frame costs stays the same where much is uncovered.
 pub const UNCOVERED_SHARE: u32 = 8;
 
 /// Maximum number of rays in a launch with which a frame ends: of `rays`, and of uncovered pixels.
@@ -103,7 +106,8 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     }
 }
 
-/// Numbers of work-groups along x, y and z for at least `parts` parts, in runs of `run` (shaders/trace/spread.glsl).
+/// Numbers of work-groups along x, y and z for at least `parts` parts, in runs of `run`
+/// (shaders/trace/spread.glsl).
 fn spread(parts: u32, run: u32) -> [u32; 3] {
     [run, parts.div_ceil(run * SPREAD), SPREAD]
 }
@@ -140,9 +144,10 @@ impl Stream {
         rays_per_lane: u32,
         memory: LaunchMemory,
     ) -> Result<Self> {
-        let (generate, deliver) = match has_ballots(&device.info) {
-            true => (Variant::Generate64, Variant::Deliver64),
-            false => (Variant::Generate, Variant::Deliver),
+        let (generate, deliver) = if has_ballots(&device.info) {
+            (Variant::Generate64, Variant::Deliver64)
+        } else {
+            (Variant::Generate, Variant::Deliver)
         };
         let pipeline = Pipeline::Steps {
             generate: match shaders.rays {
@@ -213,8 +218,8 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
-    /// A stream for camera rays whose pixels were rasterized. [`Push::rays`] is then the address of the rasterized ids
-    /// ([`crate::raster`]).
+    /// A stream for camera rays whose pixels were rasterized. [`Push::rays`] is then the address of
+    /// the rasterized ids ([`crate::raster`]).
     pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!(
@@ -232,14 +237,17 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::Known(compile(device, shaders, variant, s)?), shaders })
     }
 
-    /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. `push` must
-    /// hold the scene address of the tracer that made the stream, and the address of parameters of the stream's pass.
+    /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names
+    /// of the stream's shaders. `push` must hold the scene address of the tracer that made the
+    /// stream, and the address of parameters of the stream's pass.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         if push.count == 0 {
             return;
         }
         let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Rasterized(_));
         debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name());
+
+        // a kernel does all, or steps hand rays and hits on in memory
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
@@ -251,11 +259,13 @@ impl Stream {
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, groups));
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
+                // at most as many rays a launch as the memory holds
                 let most = memory.capacity;
                 debug_assert!(in_memory || push.count <= most, "{}: results would overwrite each other", self.shaders.name());
                 let [generating, tracing, delivering] = self.shaders.steps();
                 for first in (0..push.count).step_by(most as usize) {
                     let mut push = Push { first: push.first + first, count: most.min(push.count - first), ..*push };
+
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
                     let groups = spread(push.count.div_ceil(*rays_per_group), 1);
@@ -264,6 +274,8 @@ impl Stream {
                         // none, in no work-group
                         recorder.fill(&suspended.memory, 8, 0);
                     }
+
+                    // rays: made here, or there already, and then their hits are empty at first
                     match generate {
                         Some(generate) => {
                             push.rays = memory.rays.address();
@@ -275,6 +287,8 @@ impl Stream {
                         }
                     }
                     recorder.barrier();
+
+                    // hits: rays that a driver's limit on loops has suspended are resumed
                     recorder.timed(tracing, |r| {
                         r.dispatch_3d(trace, &push, groups);
                         if let Some(suspended) = &memory.suspended {
@@ -286,6 +300,8 @@ impl Stream {
                         }
                     });
                     recorder.barrier();
+
+                    // results
                     recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
             }

@@ -1,4 +1,5 @@
-//! Counts the BVH nodes and leaves that rays visit, by repeating the fast kernel's traversal on the host: an explanation of ray rates.
+//! Counts the BVH nodes and leaves that rays visit, by repeating the fast kernel's traversal on the
+//! host: an explanation of ray rates.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -26,7 +27,8 @@ pub struct Visits {
 }
 
 impl VisitCounter {
-    /// Builds the BVH as the compute tracer does. `None` for unsupported scenes: those of two levels, with spheres or with alpha.
+    /// Builds the BVH as the compute tracer does. `None` for unsupported scenes: those of two
+    /// levels, with spheres or with alpha.
     pub fn new(flat: &FlatScene) -> Option<Self> {
         let countable = flat.is_single_level() && !flat.has_spheres() && !flat.has_alpha();
         countable
@@ -42,23 +44,29 @@ impl VisitCounter {
         Visits { nodes: sum[0] as f64 / n, leaves: sum[1] as f64 / n }
     }
 
-    /// Visited nodes and leaves of a ray. The order of children is that of shaders/trace/wide.glsl: for the nearest hit, first the child
-    /// that the ray enters first and then the others by octant; for any hit, all by octant.
+    /// Visited nodes and leaves of a ray. The order of children is that of shaders/trace/wide.glsl:
+    /// for the nearest hit, first the child that the ray enters first and then the others by
+    /// octant; for any hit, all by octant.
     fn walk(&self, ray: &Ray, any: bool) -> [u64; 2] {
         let mut visits = [0u64; 2];
         if ray.tmax <= ray.tmin {
             return visits;
         }
         let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
+
+        // children are visited in the order of the ray's octant
         let inverse = direction.to_array().map(|d| 1.0 / if d == 0.0 { 1e-30 } else { d });
         let octant = (0..3).fold(7u32, |o, a| if inverse[a] < 0.0 { o & !(4 >> a) } else { o });
         let mut best = ray.tmax;
+
         // siblings yet to be visited: node, and slots
         let mut stack: Vec<(usize, u32)> = Vec::new();
         let mut next = Some(0usize);
         while let Some(at) = next.take() {
             let block = &self.blocks[at];
             let mut nearest = None;
+
+            // leaves end the ray, or shorten it
             if wide::is_leaf(block) {
                 visits[1] += 1;
                 if let Some(t) = meet(block, origin, direction, ray.tmin, best) {
@@ -69,6 +77,8 @@ impl VisitCounter {
                 }
             } else {
                 visits[0] += 1;
+
+                // nodes push the children that the ray meets
                 let mut hits = 0;
                 let mut least = f32::INFINITY;
                 for (slot, _) in wide::children(block) {
@@ -92,6 +102,8 @@ impl VisitCounter {
                     nearest = None;
                 }
             }
+
+            // the nearest child comes next, or the first along the ray
             if let Some((node, slots)) = stack.last_mut() {
                 let along = (0..8u32).rev().map(|rank| rank ^ octant).find(|&slot| *slots >> slot & 1 == 1).unwrap_or(0);
                 let slot = nearest.filter(|_| !any).unwrap_or(along);

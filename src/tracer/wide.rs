@@ -1,6 +1,6 @@
-//! The wide BVHs of the compute tracer's fast kernel (`shaders/trace/wide.glsl`): one per group and one over the
-//! instances, all in one array of blocks. This file makes their leaves: [`TriangleLeaf`], [`SphereLeaf`]
-//! and, in the top level, [`InstanceLeaf`].
+//! The wide BVHs of the compute tracer's fast kernel (`shaders/trace/wide.glsl`): one per group and
+//! one over the instances, all in one array of blocks. This file makes their leaves:
+//! [`TriangleLeaf`], [`SphereLeaf`] and, in the top level, [`InstanceLeaf`].
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -83,9 +83,11 @@ impl Trees {
         let (capacities, depths) = reserve(&self, flat);
         let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &capacities, &depths)));
         let group_depth = depths.groups.iter().copied().max().unwrap_or(0);
-        // Every node visit pushes at most one entry. Entering a TLAS instance pushes its siblings and the return to the top level.
+        // Every node visit pushes at most one entry. Entering a TLAS instance pushes its siblings
+        // and the return to the top level.
         let stack_entries = self.top.as_ref().map_or(0, |_| depths.top + 2) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 2);
+
         // the top level first: it is visited by every ray
         let mut roots = Vec::new();
         let mut count = capacities.top;
@@ -98,12 +100,16 @@ impl Trees {
                 "the scene's BVH has {count} blocks, more than the 2^32 that the compute tracer can address"
             )));
         }
+
+        // leaves of the top level name the root of their group
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
                 let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
                 leaf.root = roots[flat.instances[leaf.instance as usize].group];
             }
         }
+
+        // each tree is moved to its place, with room to grow where it may change
         let trees = self.top.iter().map(|t| (t, 0, capacities.top)).chain(
             self.groups.iter().zip(roots.iter().copied()).zip(&capacities.groups).map(|((t, by), &capacity)| (t, by, capacity)),
         );
@@ -114,12 +120,15 @@ impl Trees {
         // an empty scene has a node without children
         let reserved = reserved.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
         let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { reserved })?;
+
         // a ray visits a block once, and those of a group once for each of its instances
         let blocks_of = |i: &TlasInstance| capacities.groups[i.group] as u64;
         let visits = match &self.top {
             Some(_) => capacities.top as u64 + flat.instances.iter().map(blocks_of).sum::<u64>(),
             None => count as u64,
         };
+
+        // memory of a launch
         let capacity = with_uncovered(launch_rays(&device.info));
         let launch = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
         Ok(Hierarchy {
@@ -187,8 +196,8 @@ fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync
     }
 }
 
-/// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
-/// layout of nodes and leaves.
+/// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in
+/// builders, pairs, collapse, or the layout of nodes and leaves.
 const LAYOUT_VERSION: u32 = 6;
 
 /// The header of a cached BVH, beside its blocks.
@@ -201,21 +210,25 @@ struct CachedTree {
     sah_cost: f64,
 }
 
-/// What a group's BVH is built from, as leaves hold it: what a BVH from the cache is checked against.
+/// Primitives of a group as leaves hold them: its BVH is built from them, and one from the cache is
+/// checked against them.
 trait LeafSource: Sync {
     /// Number of primitives.
     fn primitive_count(&self) -> usize;
-    /// The leaf of two primitives, the second of which may be [`pairs::NONE`]; `None` if there is no such leaf.
+    /// The leaf of two primitives, the second of which may be [`pairs::NONE`]; `None` if there is
+    /// no such leaf.
     fn leaf(&self, numbers: [u32; 2]) -> Option<Block>;
     /// Bounds of a primitive.
     fn bounds(&self, number: u32) -> Aabb;
-    /// The same for two primitives of which a BVH holds the first alone; `None` for one that each BVH holds.
+    /// Key that two primitives share of which a BVH holds the first alone; `None` for one that each
+    /// BVH holds.
     fn duplicate_key(&self, number: u32) -> Option<[[u32; 4]; 3]>;
 }
 
-/// Checks a BVH from the cache as input: each leaf is the one that its primitives make, every primitive is held, the tree is one, and boxes contain what is below them. So whatever
-/// wrote the file, the device reads nothing beyond the scene, and the image is that of a BVH built here; with spatial splits (`Best`), whose leaves hold parts of primitives, boxes
-/// are not compared.
+/// Checks a BVH from the cache as input: each leaf is the one that its primitives make, every
+/// primitive is held, the tree is one, and boxes contain what is below them. So whatever wrote the
+/// file, the device reads nothing beyond the scene, and the image is that of a BVH built here; with
+/// spatial splits (`Best`), whose leaves hold parts of primitives, boxes are not compared.
 fn check_loaded(tree: &WideBvh, source: &impl LeafSource, preset: BuildPreset) -> Result<(), String> {
     let numbers = |b: &Block| {
         bytemuck::cast_ref::<Block, TriangleLeaf>(b).primitives.map(|id| match id {
@@ -269,7 +282,8 @@ fn check_loaded(tree: &WideBvh, source: &impl LeafSource, preset: BuildPreset) -
     }
 }
 
-/// The BVH of the geometry that `content` describes: from the cache if available, otherwise built and stored there.
+/// The BVH of the geometry that `content` describes: from the cache if available, otherwise built
+/// and stored there.
 fn load_or_build(
     options: &BuildOptions,
     preset: BuildPreset,
@@ -374,7 +388,7 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    fn of(flat: &FlatScene, group: &BlasGroup) -> Self {
+    fn from_group(flat: &FlatScene, group: &BlasGroup) -> Self {
         let mut out =
             Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
         for part in &group.submeshes {
@@ -391,7 +405,7 @@ impl Triangles {
 }
 
 fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
-    let triangles = Triangles::of(flat, group);
+    let triangles = Triangles::from_group(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
     let is_fixed = flat.motion.is_none();
@@ -402,9 +416,12 @@ fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) ->
         bytemuck::cast_slice(&triangles.indices),
     ];
     let source = TriangleSource { triangles: &triangles, opaque, once: if is_fixed { opaque } else { 0 } };
-    load_or_build(options, preset, &content, &source, || match is_fixed {
-        true => unique_triangle_tree(&triangles, opaque, preset),
-        false => triangle_tree_of(&triangles, opaque, preset, None),
+    load_or_build(options, preset, &content, &source, || {
+        if is_fixed {
+            unique_triangle_tree(&triangles, opaque, preset)
+        } else {
+            triangle_tree_of(&triangles, opaque, preset, None)
+        }
     })
 }
 
@@ -436,8 +453,9 @@ impl LeafSource for TriangleSource<'_> {
     }
 }
 
-/// A tree that has opaque triangles with the same three corners once, the first of them: a ray that meets one meets all of them at the same distance, and which of them it meets is
-/// not said. Very many would make a traversal that some drivers do not finish.
+/// A tree that has opaque triangles with the same three corners once, the first of them: a ray that
+/// meets one meets all of them at the same distance, and which of them it meets is not said. Very
+/// many would make a traversal that some drivers do not finish.
 fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset) -> WideBvh {
     let all = &triangles.indices;
     let Some(mut numbers) = firsts(opaque, |k| same_from_first(triangles.corners(all[k as usize]))) else {
@@ -457,8 +475,9 @@ fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset)
     tree
 }
 
-/// Instances of which each is the first of its group at its place; `None`: all of them. As with triangles, rays would meet all of those in one place. Where something may move or
-/// alpha decides, each is held.
+/// Instances of which each is the first of its group at its place; `None`: all of them. As with
+/// triangles, rays would meet all of those in one place. Where something may move or alpha decides,
+/// each is held.
 fn unique_instances(flat: &FlatScene) -> Option<Vec<u32>> {
     let is_opaque = |i: &TlasInstance| {
         let group = &flat.groups[i.group];
@@ -477,7 +496,8 @@ fn unique_instances(flat: &FlatScene) -> Option<Vec<u32>> {
 /// Things that are looked at for duplicates.
 const SAMPLED: usize = 4096;
 
-/// Numbers of the things that are the first with their key, in order; `None` if a look at some of `count` finds no two alike: duplicates too rare for it are too few to matter.
+/// Numbers of the things that are the first with their key, in order; `None` if a look at some of
+/// `count` finds no two alike: duplicates too rare for it are too few to matter.
 fn firsts<K: Ord + Send>(count: u32, key: impl Fn(u32) -> K + Sync) -> Option<Vec<u32>> {
     let stride = (count as usize).div_ceil(SAMPLED).max(1);
     let mut some: Vec<K> = (0..count).step_by(stride).map(&key).collect();
@@ -535,7 +555,7 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
 fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Option<Block> {
     let [a, b] = pair.triangles;
     let corners = |t: u32| triangles.indices[t as usize];
-    let fan = if b == pairs::NONE { Fan::single(corners(a)) } else { Fan::of(corners(a), corners(b))? };
+    let fan = if b == pairs::NONE { Fan::single(corners(a)) } else { Fan::from_triangles(corners(a), corners(b))? };
     let number = |t: u32| {
         if t == pairs::NONE {
             t
@@ -554,26 +574,28 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Option<Block> {
     }))
 }
 
-/// What a file of the cache may make of a hierarchy, for tests and fuzzers.
+/// Reads hierarchies as files of the cache hold them, for tests and fuzzers.
 #[cfg(feature = "probes")]
 pub mod probes {
     use super::*;
     use crate::scene::Scene;
 
-    /// The hierarchy of the triangles of a scene's first group, built here: its depth in four bytes, then its blocks as a cache file has them.
+    /// The hierarchy of the triangles of a scene's first group, built here: its depth in four
+    /// bytes, then its blocks as a cache file has them.
     pub fn hierarchy(scene: &Scene) -> Vec<u8> {
         let flat = FlatScene::new(scene);
         let tree = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
         [&tree.depth.to_le_bytes()[..], bytemuck::cast_slice(&tree.blocks)].concat()
     }
 
-    /// Whether such bytes are taken for the hierarchy of that group. What is taken leads nowhere but into itself, and ends.
+    /// Whether such bytes are taken for the hierarchy of that group. What is taken leads nowhere
+    /// but into itself, and ends.
     ///
     /// # Panics
     /// Where it does not.
     pub fn is_accepted(scene: &Scene, bytes: &[u8]) -> bool {
         let flat = FlatScene::new(scene);
-        let triangles = Triangles::of(&flat, &flat.groups[0]);
+        let triangles = Triangles::from_group(&flat, &flat.groups[0]);
         let opaque = flat.groups[0].opaque_count as u32;
         let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
         let built = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
@@ -606,14 +628,15 @@ mod tests {
     use super::*;
     use crate::scene::builtin;
 
-    /// Every leaf lies within the boxes above it and holds what the scene has: each triangle and sphere once, its corners bit for bit
-    /// and in their order, its alpha flag; each TLAS instance its number.
+    /// Every leaf lies within the boxes above it and holds what the scene has: each triangle and
+    /// sphere once, its corners bit for bit and in their order, its alpha flag; each TLAS instance
+    /// its number.
     fn check(name: &str) {
         let scene = builtin::by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
         let trees = Trees::build(&flat, &BuildOptions::default());
         for (tree, group) in trees.groups.iter().zip(&flat.groups) {
-            let triangles = Triangles::of(&flat, group);
+            let triangles = Triangles::from_group(&flat, group);
             let boxes: Vec<Aabb> = primitive_boxes(&flat, group).collect();
             // what a leaf of a sphere holds is read as a triangle's: their numbers are in one place
             let leaf = |b: &Block| *bytemuck::cast_ref::<Block, TriangleLeaf>(b);
@@ -649,7 +672,8 @@ mod tests {
         }
     }
 
-    /// Of triangles with the same vertices in the same order the first is held, and the others are not; one that is turned over is another.
+    /// A BVH holds the first of the triangles with the same vertices in the same order; one that is
+    /// turned over is another.
     #[test]
     fn the_same_triangle_is_held_once() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
@@ -680,7 +704,7 @@ mod tests {
         held
     }
 
-    /// Of instances in one place, and of spheres that are the same, the first is held.
+    /// A BVH holds the first of the instances in one place, and of the spheres that are the same.
     #[test]
     fn the_same_instance_and_sphere_is_held_once() {
         use crate::scene::{Instance, Sphere};
@@ -749,7 +773,8 @@ mod tests {
         std::fs::write(&path, [&good[..16], &sum, &body].concat()).unwrap();
     }
 
-    /// A file in the cache that says anything else than what would be built is not taken, whoever wrote it: a warning, and the BVH is built.
+    /// A file in the cache that says anything else than what would be built is not taken, whoever
+    /// wrote it: a warning, and the BVH is built.
     #[test]
     fn a_cached_hierarchy_is_checked_against_the_geometry() {
         for name in ["stairs", "spheres:300"] {
@@ -776,12 +801,13 @@ mod tests {
         }
     }
 
-    /// Any one bit of the blocks turned: the tree is refused, or it is one that gives the same hits (a box that is larger).
+    /// Any one bit of the blocks turned: the tree is refused, or it is one that gives the same hits
+    /// (a box that is larger).
     #[test]
     fn no_bit_of_a_cached_hierarchy_is_trusted() {
         let scene = builtin::by_name("stairs").unwrap();
         let flat = FlatScene::new(&scene);
-        let triangles = Triangles::of(&flat, &flat.groups[0]);
+        let triangles = Triangles::from_group(&flat, &flat.groups[0]);
         let opaque = flat.groups[0].opaque_count as u32;
         let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
         let good = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());

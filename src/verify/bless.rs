@@ -75,7 +75,7 @@ pub fn render(
     let images = seeds.map(|seed| session.render(frame, kind, Some(seed), None, control)).collect::<Result<Vec<_>>>()?;
     let golden = Golden::of_replicates(&path, frame, &images, &maker)?;
     if let (Some(bias), Some(reference)) = (limit.bias, &golden.reference) {
-        let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::of(&images[0])?, reference)?;
+        let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::from_image(&images[0])?, reference)?;
         let found = verdict.detectable_bias;
         if found > bias {
             let [found, bias] = [found, bias].map(|b| 100.0 * b);

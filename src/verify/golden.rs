@@ -101,7 +101,7 @@ impl Golden {
     /// [`Error::Usage`] for images without variances.
     pub fn of_replicates(path: &Path, frame: &Frame, images: &[Image], maker: &Maker) -> Result<Self> {
         images.iter().try_for_each(check_finite)?;
-        let renders = images.iter().map(Estimate::of).collect::<Result<Vec<_>>>()?;
+        let renders = images.iter().map(Estimate::from_image).collect::<Result<Vec<_>>>()?;
         let reference = Reference::new(&renders)?;
         let Some(first) = images.first() else {
             return Err(Error::Usage("a golden image needs renders".into()));
@@ -279,7 +279,7 @@ fn read_reference(image: &Image) -> std::result::Result<Option<Reference>, Strin
     let Some(replicates) = image.metadata(key::REPLICATES) else { return Ok(None) };
     let wrong = |what: &str| format!("{what}: not a golden image of this version; make it again with --bless");
     let replicates: u32 = replicates.parse().map_err(|_| wrong("verify.replicates is no number"))?;
-    let estimate = Estimate::of(image).map_err(|_| wrong("it has no variances"))?;
+    let estimate = Estimate::from_image(image).map_err(|_| wrong("it has no variances"))?;
     let whole: Vec<f64> = image.metadata(key::WHOLE).unwrap_or_default().split(',').filter_map(|v| v.parse().ok()).collect();
     let planes: Option<Vec<&[f32]>> =
         channels_with_variance(image).iter().map(|(name, _)| image.f32(&format!("{TILE_PREFIX}{name}"))).collect();

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::measure::stats::percentile;
-use crate::measure::z_test::{Estimate, Scale, TILE, Verdict, ZTest};
+use crate::measure::z_test::{Estimate, Scale, TILE, ZTest, ZTestVerdict};
 use crate::output::{Image, Samples, png};
 use crate::report::format_number;
 
@@ -104,7 +104,7 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     }
     if let (Some(limit), Some(reference)) = (&tolerance.z_test, &golden.reference) {
         let test = ZTest { false_alarms: limit.false_alarms };
-        let verdict = test.compare(&Estimate::of(image)?, reference)?;
+        let verdict = test.compare(&Estimate::from_image(image)?, reference)?;
         checks.push(noise(limit, test.holds(&verdict), &verdict));
     }
     Ok(Judgement { checks })
@@ -218,7 +218,7 @@ fn looks(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
     Ok(Check::new("flip", holds, text, json!({ "percentile": percentile, "value": found, "max": max, "mean": flip.mean })))
 }
 
-fn noise(limit: &ZTestLimit, holds: bool, verdict: &Verdict) -> Check {
+fn noise(limit: &ZTestLimit, holds: bool, verdict: &ZTestVerdict) -> Check {
     let percent = |x: f64| 100.0 * x;
     let bias = format!("bias {:+.3} % +- {:.3} %", percent(verdict.bias), percent(verdict.bias_error));
     let p = if verdict.p < 1e-3 { format!("{:.1e}", verdict.p) } else { format!("{:.3}", verdict.p) };

@@ -1,4 +1,5 @@
-//! The state of the viewer, and how events of the renderer and input of the user change it. `panels/` show it.
+//! The state of the viewer, and how events of the renderer and input of the user change it.
+//! `panels/` show it.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -43,10 +44,10 @@ const STILL_SPP: u32 = 64;
 const TURNTABLE_FRAMES: u32 = 120;
 /// Frames per second of an animation that is rendered, the default of `skylit render`.
 const ANIMATION_FPS: f64 = 30.0;
-/// What is added to the seed for the truth.
+/// Offset of the truth's seed from that of the images.
 const TRUTH_SEED: u32 = 0x7275_7468;
 
-/// What the second image shows.
+/// Content of the second image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Second {
     /// An image of its own.
@@ -110,7 +111,8 @@ pub struct App {
     /// Number of the last request, and of the last one for which nothing is left to do.
     sent_number: u64,
     idle: u64,
-    /// The technique of each image in the last request with it, by name, and the number of the first such request.
+    /// The technique of each image in the last request with it, by name, and the number of the
+    /// first such request.
     techniques: [(String, u64); TRUTH + 1],
     load: u64,
     /// The load of the scene that is shown.
@@ -121,9 +123,9 @@ pub struct App {
     pub recent: Vec<String>,
     /// When the scene's files were looked at, and when they were last modified then.
     modified: Option<(Instant, Vec<Option<std::time::SystemTime>>)>,
-    /// What is known of the scene.
+    /// Summary of the scene, once it is loaded.
     pub scene: Option<SceneSummary>,
-    /// What is known of the device.
+    /// Summary of the device.
     pub device: DeviceSummary,
     /// Settings of device and tracer.
     pub device_settings: DeviceSettings,
@@ -131,17 +133,18 @@ pub struct App {
     pub settings: RenderSettings,
     /// Lights beside the scene's.
     pub lighting: LightingSettings,
-    /// What the first image shows.
+    /// Technique that the first image shows.
     pub first: Technique,
-    /// What the second image shows.
+    /// Content of the second image.
     pub second: Second,
-    /// What first images of an integrator are compared with, if it was chosen; else see [`Technique::truth`].
+    /// Truth that first images of an integrator are compared with, if it was chosen; else see
+    /// [`Technique::truth`].
     chosen_truth: Option<(IntegratorName, Technique)>,
     /// Whether it is compared.
     pub compares: bool,
     /// Where the images are.
     pub arrangement: Arrangement,
-    /// With one image at a time: whether it is the second.
+    /// The second image is shown, where one is at a time.
     pub shows_second: bool,
     /// The images: first, second, truth.
     pub panes: [PaneState; 3],
@@ -165,9 +168,9 @@ pub struct App {
     pub is_paused: bool,
     /// The animation.
     pub playback: Playback,
-    /// What was clicked on.
+    /// Primitive that was clicked on.
     pub pick: Option<Pick>,
-    /// What is being loaded.
+    /// Text that says what is being loaded, and the share that is done.
     pub loading: Option<(String, Option<f32>)>,
     /// Names of the Vulkan devices, by index.
     pub devices: Vec<String>,
@@ -187,7 +190,8 @@ pub struct App {
     pub shows_panel: bool,
     /// Frames of the first image, the last one last.
     pub frames: VecDeque<Arc<Progress>>,
-    /// What the program was started with, or a file of settings said: lengths and places of one scene are not those of the next.
+    /// Settings of the command line, or of a file of settings: lengths and places of one scene are
+    /// not those of the next.
     given: RenderSettings,
     /// The animation to start with, by index or name, and its time.
     first_animation: Option<(String, f64)>,
@@ -262,6 +266,8 @@ impl App {
             layers: Vec::new(),
             renders: Vec::new(),
         };
+
+        // settings come first: a scene keeps those that were given
         app.take_settings(&options.settings);
         if let Some(scene) = &options.scene {
             app.open(scene);
@@ -269,7 +275,8 @@ impl App {
         app
     }
 
-    /// Takes settings over: those of images, the technique that they select, light, and the animation to start with. The camera is for the next scene.
+    /// Takes settings over: those of images, the technique that they select, light, and the
+    /// animation to start with. The camera is for the next scene.
     fn take_settings(&mut self, settings: &RenderSettings) {
         self.settings = settings.clone();
         let frames = &mut self.settings.frames;
@@ -314,7 +321,7 @@ impl App {
 
     /// Opens a file by what it is: a scene, an environment, or settings.
     pub fn open_file(&mut self, path: &str) {
-        match FileKind::of(path) {
+        match FileKind::from_path(path) {
             FileKind::Scene => self.open(path),
             FileKind::Environment => {
                 self.lighting.environment = Some(path.to_owned());
@@ -332,12 +339,13 @@ impl App {
         }
     }
 
-    /// Opens the last scene among files that were dropped on the window, and takes over the last environment and the last settings.
+    /// Opens the last scene among files that were dropped on the window, and takes over the last
+    /// environment and the last settings.
     pub fn open_dropped(&mut self, files: &[egui::DroppedFile]) {
         let paths: Vec<String> =
             files.iter().filter_map(|f| f.path.as_ref()).map(|p| p.to_string_lossy().into_owned()).collect();
         for kind in [FileKind::Scene, FileKind::Environment, FileKind::Settings] {
-            if let Some(path) = paths.iter().rev().find(|path| FileKind::of(path) == kind) {
+            if let Some(path) = paths.iter().rev().find(|path| FileKind::from_path(path) == kind) {
                 self.open_file(path);
             }
         }
@@ -361,12 +369,14 @@ impl App {
         self.report("loading was cancelled", false);
     }
 
-    /// Returns true if a scene is being loaded that can be cancelled: not the images of one that is shown.
+    /// Returns true if a scene is being loaded that can be cancelled: not the images of one that is
+    /// shown.
     pub fn can_cancel_loading(&self) -> bool {
         self.loading.is_some() && self.load != self.loaded
     }
 
-    /// Loads the scene anew, as the user wants it. The camera stays, unless it sees nothing but black.
+    /// Loads the scene anew, as the user wants it. The camera stays, unless it sees nothing but
+    /// black.
     pub fn reload(&mut self) {
         if self.source.is_some() {
             self.load_anew();
@@ -422,7 +432,8 @@ impl App {
         self.failure.is_some() || self.loading.is_none() && self.idle >= self.sent_number
     }
 
-    /// Samples of each pixel of the first image, if it is one of what was requested last; otherwise 0.
+    /// Samples of each pixel of the first image, if it is one of what was requested last; otherwise
+    /// 0.
     pub fn shown_samples(&self) -> u32 {
         let progress = self.panes[0].progress.as_ref().filter(|p| self.loading.is_none() && p.request >= self.sent_number);
         progress.map_or(0, |p| p.step.samples)
@@ -453,6 +464,8 @@ impl App {
                         self.failure = Some(text);
                     }
                 }
+
+                // the camera to start with, and the radius that suits what it sees
                 Event::Camera(camera, openness) => {
                     if let (None, Some(scene)) = (&self.control, self.scene.clone()) {
                         // as `skylit render` does
@@ -462,7 +475,8 @@ impl App {
                         let radius = match ao.ao_radius {
                             Some(Length::Units(units)) => Some(units),
                             Some(share @ Length::OfDiagonal(_)) => share.units(control.scene_size()).map(round_length),
-                            // in a closed room every ray hits something: without a radius it would be black
+                            // in a closed room every ray hits something: without a radius it would
+                            // be black
                             chosen => openness.and_then(|o| o.limit(chosen.is_some())),
                         };
                         let is_chosen = !matches!(ao.ao_radius, Some(Length::Units(_)));
@@ -473,6 +487,8 @@ impl App {
                         self.control = Some(control);
                     }
                 }
+
+                // devices and images
                 Event::Device(device) => self.device = device,
                 Event::Devices(names) => self.devices = names,
                 Event::Picture(progress) => {
@@ -492,9 +508,12 @@ impl App {
                 }
                 Event::Idle(number) => self.idle = number,
                 Event::Black(pane, reason) => self.panes[pane].black = reason,
+
                 // of what was shown before
                 Event::Compared(comparison) if comparison.request < self.comparable || !self.compares_now() => {}
                 Event::Compared(comparison) => self.comparison = Some(comparison),
+
+                // answers to what the user has done
                 Event::Framed(cameras) => {
                     let [from, to] = *cameras;
                     if self.control.as_ref().is_some_and(|c| *c.camera() == from) {
@@ -510,6 +529,8 @@ impl App {
                     }
                 }
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
+
+                // messages
                 Event::Saved(Ok(path)) => self.report(format!("saved {}", path.display()), false),
                 Event::Saved(Err(text)) => self.report(text, true),
                 Event::Warning(text) => self.report(text, true),
@@ -526,12 +547,15 @@ impl App {
         let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
         let is_same_load = self.scene.as_ref().is_some_and(|s| s.load == summary.load);
         let lacked_images = self.scene.as_ref().is_some_and(|s| s.load == summary.load && !s.is_complete);
-        let what = match lacked_images && summary.is_complete {
-            true => format!("loaded the images of {}", summary.source),
-            false => format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds),
+        let what = if lacked_images && summary.is_complete {
+            format!("loaded the images of {}", summary.source)
+        } else {
+            format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds)
         };
         self.report(what, false);
         super::recent::add(&mut self.recent, &summary.source);
+
+        // what belongs to the load before is dropped, and more if the scene is another one
         self.loaded = summary.load;
         self.loading = (!summary.is_complete).then(|| ("loading images".to_owned(), None));
         self.panes.iter_mut().for_each(|p| (p.error, p.black) = (None, None));
@@ -556,6 +580,8 @@ impl App {
             self.frames.clear();
             self.start_animation(&summary.animations);
         }
+
+        // the file may have lost its animation, or have a shorter one
         let durations = |k: usize| summary.animations.get(k).map(|a| a.1);
         if let Some(k) = self.playback.animation {
             // the file has changed
@@ -604,9 +630,10 @@ impl App {
             self.playback.time += seconds * self.playback.speed;
             let duration = self.scene.as_ref().and_then(|s| s.animations.get(k)).map_or(0.0, |a| a.1);
             if self.playback.time >= duration {
-                (self.playback.time, self.playback.runs) = match self.playback.repeats && duration > 0.0 {
-                    true => (self.playback.time.rem_euclid(duration), true),
-                    false => (duration, false),
+                (self.playback.time, self.playback.runs) = if self.playback.repeats && duration > 0.0 {
+                    (self.playback.time.rem_euclid(duration), true)
+                } else {
+                    (duration, false)
                 };
             }
             context.request_repaint();
@@ -629,7 +656,8 @@ impl App {
         }
     }
 
-    /// No longer follows a camera of the file: the user's goes on from where the animation has moved it.
+    /// No longer follows a camera of the file: the user's goes on from where the animation has
+    /// moved it.
     pub fn leave_followed(&mut self) {
         if self.followed.is_some() {
             let shown = self.shown_camera();
@@ -644,7 +672,7 @@ impl App {
         moved.or_else(|| self.control.as_ref().map(|c| c.camera().clone()))
     }
 
-    /// What the first image is compared with.
+    /// Returns the technique that the first image is compared with.
     pub fn truth(&self) -> Technique {
         match self.chosen_truth {
             Some((of, truth)) if of == self.first.integrator() => truth,
@@ -657,13 +685,15 @@ impl App {
         self.chosen_truth.is_some_and(|(of, _)| of == self.first.integrator())
     }
 
-    /// Chooses what images of the first image's integrator are compared with; `None`: what they approximate.
+    /// Chooses what images of the first image's integrator are compared with; `None`: what they
+    /// approximate.
     pub fn choose_truth(&mut self, truth: Option<Technique>) {
         self.chosen_truth = truth.map(|truth| (self.first.integrator(), truth));
     }
 
     /// Sends what has changed.
     fn send(&mut self) {
+        // images on the screen, then the truth if something is compared with it
         let mut panes = vec![self.first.settings(&self.settings)];
         if let (Second::Technique(t), true) = (self.second, self.needs_second()) {
             panes.push(t.settings(&self.settings));
@@ -671,7 +701,8 @@ impl App {
         let shown = panes.len();
         if self.compares_now() {
             let mut truth = self.truth().settings(&self.settings);
-            // samples of its own: of the same ones a truth of the same integrator would be the same image
+            // samples of its own: of the same ones a truth of the same integrator would be the same
+            // image
             truth.image.seed = Some(truth.seed().wrapping_add(TRUTH_SEED));
             if panes[0].realtime_setting().is_some() {
                 // what differs shall not be the samples' place in the pixel
@@ -684,6 +715,8 @@ impl App {
             }
             panes.push(truth);
         }
+
+        // a request like the last one changes nothing
         let request = Request {
             scene: self.source.clone(),
             load: self.load,
@@ -707,6 +740,8 @@ impl App {
         if request == self.sent && self.tasks.is_empty() {
             return;
         }
+
+        // what is shown and measured may be of the request before
         let (before, first) = (std::mem::take(&mut self.sent), |r: &Request| r.panes.first().cloned());
         let is_another_view = !request.shows_same_view(&before);
         let is_another_image = is_another_view || first(&request) != first(&before);
@@ -723,6 +758,7 @@ impl App {
         if request.panes != before.panes {
             self.panes.iter_mut().for_each(|p| p.error = None);
         }
+
         // what is not requested is not kept up to date
         let requested: Vec<_> = (0..request.panes.len()).map(|k| request.pane(k)).collect();
         for (k, pane) in self.panes.iter_mut().enumerate() {
@@ -730,6 +766,7 @@ impl App {
                 *pane = PaneState::default();
             }
         }
+
         let tasks = std::mem::take(&mut self.tasks);
         self.sent = request.clone();
         self.sent_number = self.mailbox.change(|r| {
@@ -738,6 +775,8 @@ impl App {
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
         });
+
+        // answers to earlier requests do not count any more
         if is_another_comparison {
             self.comparable = self.sent_number;
         }
@@ -780,11 +819,11 @@ impl App {
 
     /// The picture of the first image, or of the second.
     pub fn picture(&self, is_second: bool) -> Option<Arc<ViewPicture>> {
-        let of = |k: usize| self.panes[k].progress.as_ref().map(|p| p.picture.clone());
+        let shown = |k: usize| self.panes[k].progress.as_ref().map(|p| p.picture.clone());
         match (is_second, self.second) {
-            (false, _) => of(0),
-            (true, Second::Technique(_)) => of(1),
-            (true, Second::Truth) => of(TRUTH),
+            (false, _) => shown(0),
+            (true, Second::Technique(_)) => shown(1),
+            (true, Second::Truth) => shown(TRUTH),
             (true, Second::HeatMap) => self.comparison.as_ref().map(|c| c.heat_map.clone()),
         }
     }
@@ -799,7 +838,8 @@ impl App {
         }
     }
 
-    /// Returns true while an image is not yet what its name says: another technique was chosen, and its first picture is to come.
+    /// Returns true while an image is not yet what its name says: another technique was chosen, and
+    /// its first picture is to come.
     pub fn is_title_ahead(&self, is_second: bool) -> bool {
         let pane = self.pane(is_second);
         let (name, first) = &self.techniques[pane];
@@ -857,7 +897,8 @@ impl App {
         settings
     }
 
-    /// Settings of `skylit render` for what is shown: its camera, its moment of the animation, and samples of a still.
+    /// Settings of `skylit render` for what is shown: its camera, its moment of the animation, and
+    /// samples of a still.
     ///
     /// # Errors
     /// [`Error::Usage`] for a camera that options cannot say, and before there is one.
@@ -975,7 +1016,8 @@ impl App {
         }
     }
 
-    /// Frames per second, median and 95th percentile of frame times in milliseconds, and rays per second, of the last frames of the first image.
+    /// Frames per second, median and 95th percentile of frame times in milliseconds, and rays per
+    /// second, of the last frames of the first image.
     pub fn figures(&self) -> Option<Figures> {
         let ms: Vec<f64> = self.frames.iter().map(|p| 1e3 * p.time.as_secs_f64()).collect();
         let median = crate::measure::stats::median(&ms)?;

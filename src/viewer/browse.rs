@@ -6,7 +6,8 @@ use std::task::Poll;
 
 use super::dialog::Dialog;
 
-/// The system's dialog while it is open. It runs on a thread of its own, so that the window stays alive.
+/// The system's dialog while it is open. It runs on a thread of its own, so that the window stays
+/// alive.
 pub struct Browsing {
     dialog: Dialog,
     chosen: Receiver<PathBuf>,
@@ -45,7 +46,8 @@ impl Browsing {
         Self { dialog, chosen }
     }
 
-    /// What was chosen: the dialog with the path in it, or `None` when it was closed without a choice.
+    /// Returns the dialog with the chosen path in it, or `None` when it was closed without a
+    /// choice.
     pub fn poll(&self) -> Poll<Option<Dialog>> {
         match self.chosen.try_recv() {
             Ok(path) => {

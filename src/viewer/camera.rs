@@ -9,7 +9,8 @@ const TURN: f64 = 0.006;
 /// Closest that the view direction comes to the vertical, radians.
 const POLE: f64 = 1e-3;
 
-/// A camera that a user moves: its position, and a pivot in front of it around which it orbits. World up is +y.
+/// A camera that a user moves: its position, and a pivot in front of it around which it orbits.
+/// World up is +y.
 #[derive(Clone, Debug)]
 pub struct CameraControl {
     camera: Camera,
@@ -61,12 +62,14 @@ impl CameraControl {
         self.eye() + self.forward() * self.distance
     }
 
-    /// Sets the point that it orbits, which stays where it is in the image only if it is in the view's centre.
+    /// Sets the point that it orbits, which stays where it is in the image only if it is in the
+    /// view's centre.
     pub fn set_pivot_distance(&mut self, distance: f64) {
         self.distance = distance.max(1e-6 * self.scene_size);
     }
 
-    /// Points it in a direction, given as turns about the vertical and about its own horizontal axis; roll is kept out.
+    /// Points it in a direction, given as turns about the vertical and about its own horizontal
+    /// axis; roll is kept out.
     fn turn(&mut self, yaw: f64, pitch: f64) {
         let forward = self.forward();
         let elevation = forward.y.clamp(-1.0, 1.0).asin();
@@ -95,7 +98,8 @@ impl CameraControl {
         self.turn(dx * TURN * 0.5, -dy * TURN * 0.5);
     }
 
-    /// Moves sideways and up, so that the pivot follows a drag of so many points in a view of `height` points.
+    /// Moves sideways and up, so that the pivot follows a drag of so many points in a view of
+    /// `height` points.
     pub fn pan(&mut self, dx: f64, dy: f64, height: f64) {
         let visible = match self.camera.projection {
             Projection::Perspective { fov_y } => 2.0 * self.distance * (0.5 * fov_y).tan(),
@@ -106,7 +110,8 @@ impl CameraControl {
         self.shift((m.y_axis * dy - m.x_axis * dx) * unit);
     }
 
-    /// Moves towards the pivot: at 1 not at all, at 0.5 half the way, at 2 back to twice the distance.
+    /// Moves towards the pivot: at 1 not at all, at 0.5 half the way, at 2 back to twice the
+    /// distance.
     pub fn zoom(&mut self, factor: f64) {
         let factor = factor.clamp(0.05, 20.0);
         if let Projection::Orthographic { half_height } = &mut self.camera.projection {
@@ -161,7 +166,8 @@ impl CameraControl {
         self.become_free();
     }
 
-    /// It is no longer one of the file's, whose far clipping plane would hide the scene from whoever steps back.
+    /// It is no longer one of the file's, whose far clipping plane would hide the scene from
+    /// whoever steps back.
     fn become_free(&mut self) {
         self.camera.name.clear();
         self.camera.clip.far = f64::INFINITY;
@@ -199,7 +205,8 @@ mod tests {
     #[test]
     fn drags_move_what_is_under_the_pointer() {
         let mut c = control();
-        // the pivot's plane is 2 * 5 * tan(0.4) high: a drag over the whole height moves the camera by that
+        // the pivot's plane is 2 * 5 * tan(0.4) high: a drag over the whole height moves the camera
+        // by that
         c.pan(0.0, 600.0, 600.0);
         assert!((c.eye().y - (1.0 + 10.0 * 0.4f64.tan())).abs() < 1e-9);
         c.zoom(0.5);

@@ -13,7 +13,7 @@ pub enum FileKind {
 
 impl FileKind {
     /// The kind of a file by its name.
-    pub fn of(path: &str) -> Self {
+    pub fn from_path(path: &str) -> Self {
         let extension = std::path::Path::new(path).extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
             _ if path.starts_with("builtin:") => Self::Scene,

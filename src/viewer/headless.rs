@@ -1,4 +1,5 @@
-//! The viewer without a window: a script is its user, and what it shows is painted by the CPU into memory.
+//! The viewer without a window: a script is its user, and what it shows is painted by the CPU into
+//! memory.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +23,8 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// Runs a script to its end and returns the figures of its sections.
 ///
 /// # Errors
-/// [`crate::Error::CheckFailed`] for what the script expects and is not so; those of reading it, and of writing screenshots.
+/// [`crate::Error::CheckFailed`] for what the script expects and is not so; those of reading it,
+/// and of writing screenshots.
 pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
     let mut script = Script::load(script)?;
     let mailbox = Arc::new(Mailbox::default());
@@ -43,7 +45,8 @@ pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
     outcome.map(|()| script.sections().to_vec())
 }
 
-/// Frames are made as a window makes them: when there is input, when the renderer has news, and when the user interface asks for one.
+/// Frames are made as a window makes them: when there is input, when the renderer has news, and
+/// when the user interface asks for one.
 fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32; 2], woken: &AtomicBool) -> Result<()> {
     // in pixels; and the display's scale
     let (mut size, mut scale, start) = (size, 1.0, Instant::now());
@@ -51,11 +54,14 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
     let (mut painter, mut painted, mut words) = (CpuPainter::default(), Painted::default(), Vec::new());
     loop {
         let frame_start = Instant::now();
+
         // the size of the window in points, which are larger when the text is
         let pixels_per_point = scale * context.zoom_factor();
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / pixels_per_point);
         let mut input = RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
         input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
+
+        // without anything to do the loop sleeps, as a window does
         let Some(requests) = script.input(&mut input, app)? else { return Ok(()) };
         let has_input = !input.events.is_empty() || !input.dropped_files.is_empty() || requests.screenshot.is_some();
         let is_due = redraw.is_some_and(|at| at <= frame_start);
@@ -64,6 +70,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
             std::thread::sleep(FRAME);
             continue;
         }
+
+        // one frame, as a window shows it
         app.open_dropped(&input.dropped_files);
         let mut output = context.run(input, |context| panels::show_frame(app, context));
         painted.take(&mut output);
@@ -72,6 +80,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         words.resize(pixels[0] * pixels[1], 0);
         painter.paint(&mut FrameBuffer { size: pixels, words: &mut words }, BACKGROUND, app.layers(), context, &mut painted);
         script.observe_time(frame_start.elapsed());
+
+        // requests of the script
         if let Some(path) = requests.screenshot {
             let rgb: Vec<u8> = words.iter().flat_map(|w| [(w >> 16) as u8, (w >> 8) as u8, *w as u8]).collect();
             png::write_rgb(&path, &rgb, size[0], size[1])?;
@@ -85,6 +95,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
             scale = wanted;
             woken.store(true, Ordering::Relaxed);
         }
+
+        // the interface says when it wants to be shown again
         let delay = output.viewport_output.get(&egui::ViewportId::ROOT).map(|v| v.repaint_delay);
         redraw = delay.and_then(|delay| frame_start.checked_add(delay));
         if app.closes {

@@ -1,7 +1,9 @@
-//! A window in which a scene's ambient occlusion is traced while one moves through it, with the path-traced truth beside it.
+//! A window in which a scene's ambient occlusion is traced while one moves through it, with the
+//! path-traced truth beside it.
 //!
-//! [`app`] is the state of the user interface and `panels` shows it; [`worker`] renders on a thread of its own what [`request`]s say. Neither knows a window: [`window`] has
-//! one; [`headless`] runs a [`script`] without one.
+//! [`app`] is the state of the user interface and `panels` shows it; [`worker`] renders on a thread
+//! of its own what [`request`]s say. Neither knows a window: [`window`] has one; [`headless`] runs
+//! a [`script`] without one.
 
 pub mod app;
 pub mod browse;

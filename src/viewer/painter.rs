@@ -42,7 +42,7 @@ impl CpuPainter {
     }
 }
 
-/// What of egui's output is painted.
+/// Part of egui's output that is painted.
 #[derive(Default)]
 pub struct Painted {
     /// Shapes of the frame.

@@ -21,9 +21,10 @@ pub fn load() -> Vec<String> {
 /// Puts a scene first and saves the list. A failure only forgets.
 pub fn add(recent: &mut Vec<String>, source: &str) {
     // the folder that a relative path refers to is another one next time
-    let source = match source.starts_with("builtin:") {
-        true => source.to_owned(),
-        false => std::fs::canonicalize(source).map_or_else(|_| source.to_owned(), |p| p.to_string_lossy().into_owned()),
+    let source = if source.starts_with("builtin:") {
+        source.to_owned()
+    } else {
+        std::fs::canonicalize(source).map_or_else(|_| source.to_owned(), |p| p.to_string_lossy().into_owned())
     };
     recent.retain(|r| *r != source);
     recent.insert(0, source);

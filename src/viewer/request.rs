@@ -1,4 +1,5 @@
-//! What the window and the thread that renders tell each other: requests, of which the latest counts, and events.
+//! Messages between the window and the thread that renders: requests, of which the latest counts,
+//! and events.
 
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
@@ -21,7 +22,7 @@ pub type Pane = usize;
 /// Index of the truth.
 pub const TRUTH: Pane = 2;
 
-/// What is to be rendered.
+/// Scene, settings and size of what is to be rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
     /// The scene, a file or `builtin:NAME`; none before one is opened.
@@ -68,11 +69,12 @@ impl Request {
         if k < self.shown { k } else { TRUTH }
     }
 
-    /// Returns true if another request is of the same scene in the same pose and light, seen by the same camera at the same size on the same device.
+    /// Returns true if another request is of the same scene in the same pose and light, seen by the
+    /// same camera at the same size on the same device.
     pub fn shows_same_view(&self, other: &Self) -> bool {
-        let of = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size);
+        let view = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size);
         let lit = |r: &Self| (r.scene.clone(), r.device.clone(), r.lighting.clone(), r.camera.clone());
-        of(self) == of(other) && lit(self) == lit(other)
+        view(self) == view(other) && lit(self) == lit(other)
     }
 
     /// Width over height of the view.
@@ -88,7 +90,7 @@ pub enum Task {
     Pick {
         /// The point.
         at: [f64; 2],
-        /// What it is for.
+        /// Purpose of the pick.
         purpose: PickPurpose,
     },
     /// Find a camera that sees something, if this one sees nothing or all of it is black.
@@ -105,16 +107,16 @@ pub enum Task {
     },
 }
 
-/// What a point was picked for.
+/// Purpose that a point was picked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PickPurpose {
-    /// To describe it.
+    /// The point is described.
     Describe,
-    /// To look at it.
+    /// The camera looks at the point.
     Focus,
 }
 
-/// What the renderer has done.
+/// Report of the renderer to the window.
 #[derive(Debug)]
 pub enum Event {
     /// A scene is being loaded: what is being done, and the share that is done, if that is known.
@@ -153,20 +155,20 @@ pub enum Event {
     Failed(String),
 }
 
-/// What the window shows of a scene.
+/// Figures of a scene that the window shows.
 #[derive(Clone, Debug, Default)]
 pub struct SceneSummary {
     /// [`Request::load`] that it answers.
     pub load: u64,
-    /// Its images are there, too; else they follow.
+    /// The scene's images are there, too; else they follow.
     pub is_complete: bool,
     /// The file, or `builtin:NAME`.
     pub source: String,
     /// The files that it was read from.
     pub files: Vec<PathBuf>,
-    /// Its bounds in world space, scene units.
+    /// Bounds in world space, scene units.
     pub bounds: (DVec3, DVec3),
-    /// Its cameras.
+    /// Cameras of the scene.
     pub cameras: Vec<Camera>,
     /// Names and durations, in seconds, of its animations.
     pub animations: Vec<(String, f64)>,
@@ -180,12 +182,12 @@ pub struct SceneSummary {
     pub seconds: f64,
 }
 
-/// What the window shows of the device.
+/// Figures of the device that the window shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeviceSummary {
     /// Name of the device and its driver.
     pub name: String,
-    /// Its index among the devices.
+    /// Index among the devices.
     pub index: usize,
     /// The tracer, and why it was chosen.
     pub tracer: (String, String),
@@ -202,7 +204,7 @@ pub struct DeviceSummary {
 pub struct Progress {
     /// The image.
     pub pane: Pane,
-    /// What to show.
+    /// Picture to show.
     pub picture: Arc<ViewPicture>,
     /// The camera that it was rendered with: an animation may have moved it.
     pub camera: Option<Camera>,

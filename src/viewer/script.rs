@@ -1,4 +1,5 @@
-//! Scripts that use the viewer as a person would: they move the mouse, press keys, click on controls by their names, wait, and take screenshots.
+//! Scripts that use the viewer as a person would: they move the mouse, press keys, click on
+//! controls by their names, wait, and take screenshots.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -93,7 +94,7 @@ impl Condition {
     }
 }
 
-/// What a script requests of its host.
+/// Requests of a script to its host.
 #[derive(Clone, Debug, Default)]
 pub struct HostRequests {
     /// Save what the window shows.
@@ -107,7 +108,7 @@ pub struct HostRequests {
 /// Figures of a section of a script.
 #[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Section {
-    /// Its name.
+    /// Name of the section.
     pub name: String,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -115,7 +116,8 @@ pub struct Section {
     pub first_picture_seconds: Option<f64>,
     /// Frames of the user interface.
     pub ui_frames: u32,
-    /// Milliseconds of frames of the user interface, input to image: median, 95th percentile, maximum.
+    /// Milliseconds of frames of the user interface, input to image: median, 95th percentile,
+    /// maximum.
     pub ui_frame_ms: [f64; 3],
     /// Steps of the first image.
     pub pictures: usize,
@@ -179,16 +181,16 @@ impl Measured {
     }
 
     fn end(&self, app: &App) -> Section {
-        let of = |values: &[f64], share: f64| crate::measure::stats::percentile(values, share).unwrap_or(0.0);
+        let percentile = |values: &[f64], share: f64| crate::measure::stats::percentile(values, share).unwrap_or(0.0);
         Section {
             name: self.name.clone(),
             seconds: self.start.elapsed().as_secs_f64(),
             first_picture_seconds: self.first_picture,
             ui_frames: self.ui_ms.len() as u32,
-            ui_frame_ms: [of(&self.ui_ms, 0.5), of(&self.ui_ms, 0.95), of(&self.ui_ms, 1.0)],
+            ui_frame_ms: [percentile(&self.ui_ms, 0.5), percentile(&self.ui_ms, 0.95), percentile(&self.ui_ms, 1.0)],
             pictures: self.picture_ms.len(),
-            picture_ms: [of(&self.picture_ms, 0.5), of(&self.picture_ms, 0.95)],
-            latency_ms: [of(&self.latency_ms, 0.5), of(&self.latency_ms, 0.95)],
+            picture_ms: [percentile(&self.picture_ms, 0.5), percentile(&self.picture_ms, 0.95)],
+            latency_ms: [percentile(&self.latency_ms, 0.5), percentile(&self.latency_ms, 0.95)],
             error: app.comparison.as_ref().map(|c| (c.rmse, c.flip, c.truth_error)),
             memory_mib: resident_mib(),
         }
@@ -270,7 +272,8 @@ impl Script {
         self.section.ui_ms.push(1e3 * time.as_secs_f64());
     }
 
-    /// Adds the input of the next frame. Returns what the host is to do besides; `None`: the script has ended.
+    /// Adds the input of the next frame. Returns what the host is to do besides; `None`: the script
+    /// has ended.
     ///
     /// # Errors
     /// [`Error::CheckFailed`] for what was expected and is not so, naming the line.
@@ -341,6 +344,8 @@ impl Script {
                     _ => Ok(false),
                 }
             }
+
+            // keys and text
             Command::Key(modifiers, key, time) => {
                 let event =
                     |pressed| Event::Key { key: *key, physical_key: None, pressed, repeat: false, modifiers: *modifiers };
@@ -362,6 +367,8 @@ impl Script {
                 input.events.push(Event::Text(text.clone()));
                 Ok(true)
             }
+
+            // controls by their labels
             Command::Click(label) => match self.bring_into_view(label, current.seen, input) {
                 Ok(seen) if seen.elapsed() < SCROLLING => {
                     current.seen = Some(seen);
@@ -388,6 +395,8 @@ impl Script {
                 input.events.push(Event::AccessKitActionRequest(request));
                 Ok(true)
             }
+
+            // the pointer
             Command::Press(at, button, times) => Ok(self.click(input, *at, *button, step, *times)),
             Command::Drag(from, to, time, button, modifiers) => {
                 Ok(self.drag(input, [*from, *to], *time, *button, *modifiers, step, elapsed))
@@ -417,6 +426,8 @@ impl Script {
                 });
                 Ok(true)
             }
+
+            // the window and its files
             Command::Resize(size) => {
                 requests.resize = Some(*size);
                 Ok(true)
@@ -433,6 +444,8 @@ impl Script {
                 requests.screenshot = Some(path.clone());
                 Ok(true)
             }
+
+            // figures and expectations
             Command::Mark(name) => {
                 self.sections.push(self.section.end(app));
                 self.section = Measured::new(name);
@@ -484,8 +497,9 @@ impl Script {
         input.events.push(Event::PointerMoved(at));
     }
 
-    /// A click over several frames: move, then press and release. Both in one frame: where frames are slow, what is released in a later one is no click, but a long press.
-    /// Returns true at its end.
+    /// A click over several frames: move, then press and release. Both in one frame: where frames
+    /// are slow, what is released in a later one is no click, but a long press. Returns true at its
+    /// end.
     fn click(&mut self, input: &mut RawInput, at: Pos2, button: PointerButton, step: u32, times: u32) -> bool {
         if step == 0 {
             self.move_to(input, at);
@@ -529,12 +543,13 @@ impl Script {
         if let Some(own) = own.filter(|o| !o.is_empty()) {
             return own.to_owned();
         }
-        let of = |id: &NodeId| self.tree.iter().find(|(k, _)| k == id).map(|(_, n)| n);
-        let labels = node.labelled_by().iter().filter_map(of).filter_map(|n| n.label().or(n.value()));
+        let labelled = |id: &NodeId| self.tree.iter().find(|(k, _)| k == id).map(|(_, n)| n);
+        let labels = node.labelled_by().iter().filter_map(labelled).filter_map(|n| n.label().or(n.value()));
         labels.collect::<Vec<_>>().join(" ")
     }
 
-    /// Finds a control by its name: exactly, or as the beginning of it. `is_number`: only what has a numeric value.
+    /// Finds a control by its name: exactly, or as the beginning of it. `is_number`: only what has
+    /// a numeric value.
     fn find(&self, label: &str, is_number: bool) -> Result<(NodeId, &accesskit::Node), String> {
         let fits = |n: &accesskit::Node| {
             let is_text = n.role() == Role::Label && !is_number;
@@ -575,6 +590,8 @@ fn parse(line: &str) -> Option<Command> {
     let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     let rest = rest.trim();
     let words: Vec<&str> = rest.split_whitespace().collect();
+
+    // words as numbers, places and times
     let number = |k: usize| words.get(k)?.parse::<f32>().ok().filter(|x| x.is_finite());
     let at = |k: usize| Some(Pos2::new(number(k)?, number(k + 1)?));
     let seconds = |k: usize, default: f32| {
@@ -587,6 +604,7 @@ fn parse(line: &str) -> Option<Command> {
         "middle" => Some(PointerButton::Middle),
         _ => None,
     };
+
     Some(match name {
         "wait" => match *words.first()? {
             "picture" => Command::WaitFor(Condition::Picture, patience(1)?),
@@ -657,15 +675,15 @@ mod tests {
 
     #[test]
     fn commands_are_read() {
-        let of = |line: &str| parse(line);
-        assert_eq!(of("wait 0.5"), Some(Command::Wait(Duration::from_millis(500))));
-        assert_eq!(of("wait samples 32"), Some(Command::WaitFor(Condition::Samples(32), PATIENCE)));
-        assert_eq!(of("wait samples 8 7"), Some(Command::WaitFor(Condition::Samples(8), Duration::from_secs(7))));
-        assert!(of("wait samples").is_none() && of("wait samples 0").is_none() && of("wait samples many").is_none());
-        assert_eq!(of("wait settled 7"), Some(Command::WaitFor(Condition::Settled, Duration::from_secs(7))));
-        assert_eq!(of("wait text:Open a scene"), Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE)));
-        assert_eq!(of("key Ctrl+S"), Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO)));
-        assert_eq!(of("set AO radius = 0.5"), Some(Command::Set("AO radius".into(), 0.5)));
+        let read = |line: &str| parse(line);
+        assert_eq!(read("wait 0.5"), Some(Command::Wait(Duration::from_millis(500))));
+        assert_eq!(read("wait samples 32"), Some(Command::WaitFor(Condition::Samples(32), PATIENCE)));
+        assert_eq!(read("wait samples 8 7"), Some(Command::WaitFor(Condition::Samples(8), Duration::from_secs(7))));
+        assert!(read("wait samples").is_none() && read("wait samples 0").is_none() && read("wait samples many").is_none());
+        assert_eq!(read("wait settled 7"), Some(Command::WaitFor(Condition::Settled, Duration::from_secs(7))));
+        assert_eq!(read("wait text:Open a scene"), Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE)));
+        assert_eq!(read("key Ctrl+S"), Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO)));
+        assert_eq!(read("set AO radius = 0.5"), Some(Command::Set("AO radius".into(), 0.5)));
         let drag = Command::Drag(
             Pos2::new(1.0, 2.0),
             Pos2::new(3.0, 4.0),
@@ -673,10 +691,10 @@ mod tests {
             PointerButton::Primary,
             Modifiers::SHIFT,
         );
-        assert_eq!(of("drag 1 2 3 4 0.5 shift"), Some(drag));
+        assert_eq!(read("drag 1 2 3 4 0.5 shift"), Some(drag));
         let control = Command::DragControl("Line between".into(), Vec2::new(-50.0, 0.0), Duration::from_secs(1));
-        assert_eq!(of("drag-control Line between -50 0 1"), Some(control));
-        assert_eq!(of("press 5 6 right"), Some(Command::Press(Pos2::new(5.0, 6.0), PointerButton::Secondary, 1)));
+        assert_eq!(read("drag-control Line between -50 0 1"), Some(control));
+        assert_eq!(read("press 5 6 right"), Some(Command::Press(Pos2::new(5.0, 6.0), PointerButton::Secondary, 1)));
         for bad in [
             "",
             "wait",
@@ -692,7 +710,7 @@ mod tests {
             "scale 0",
             "scale",
         ] {
-            assert_eq!(of(bad), None, "{bad}");
+            assert_eq!(read(bad), None, "{bad}");
         }
         let script = Script::parse("# nothing\n\n wait 1\nfly", Path::new("a.txt"));
         assert!(script.err().unwrap().to_string().contains("line 4"));

@@ -1,4 +1,5 @@
-//! What a view can show: presets of real-time ambient occlusion and their buffers, integrators of stills, and the truth of what is beside it.
+//! Techniques that a view can show: presets of real-time ambient occlusion and their buffers,
+//! integrators of stills, and the truth of what is beside it.
 
 use crate::integrators::{self, IntegratorName};
 use crate::realtime::display::DisplayMode;
@@ -8,7 +9,7 @@ use crate::renderer::RenderSettings;
 use crate::sampling::Sequence;
 use crate::settings::Capability;
 
-/// What a view shows.
+/// Technique that a view shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Technique {
     /// Ambient occlusion in real time.
@@ -21,7 +22,8 @@ pub enum Technique {
     Still(IntegratorName),
     /// A buffer of real-time ambient occlusion.
     Buffer(DisplayMode),
-    /// Ambient occlusion without filter, which converges while the camera rests: the truth of the real-time techniques.
+    /// Ambient occlusion without filter, which converges while the camera rests: the truth of the
+    /// real-time techniques.
     Converged,
 }
 
@@ -110,13 +112,14 @@ impl Technique {
         }
     }
 
-    /// What it is an estimate of: the truth that it is compared with unless another is chosen.
+    /// Returns what it estimates: the truth that it is compared with unless another is chosen.
     pub fn truth(self) -> Self {
         let integrator = self.integrator();
         if integrator.can(Capability::AmbientVisibility) { Self::Converged } else { Self::Still(integrator) }
     }
 
-    /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.
+    /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same
+    /// meaning.
     pub fn is_occlusion(self) -> bool {
         match self {
             Self::Preset(_) | Self::Gtao | Self::Converged => true,
@@ -135,8 +138,11 @@ impl Technique {
             film: Default::default(),
             ..base.clone()
         };
+
+        // size, samples and time are the window's affair
         (settings.image.size, settings.image.spp, settings.image.time_limit) = (None, None, None);
         settings.integrator = None;
+
         // what moves is the viewer's affair
         let own = FrameSettings {
             frames: None,
@@ -149,6 +155,8 @@ impl Technique {
             show: None,
             ..base.frames.clone()
         };
+
+        // each technique decides what its name says, and leaves the rest to the user
         settings.frames = match self {
             Self::Preset(preset @ Preset::Larsen) => {
                 FrameSettings { preset: Some(preset), primary: own.primary, ..Default::default() }

@@ -124,10 +124,10 @@ fn images_that_are_compared() {
     let image = folder.write("a.png", bomb(1024));
     let load = |budget: &Budget| skylit::output::load_within(&image, budget).map(|_| ());
     // a channel and, until it is made, pixels of a byte and floats
-    let two = Budget::of(12 << 20);
+    let two = Budget::with_limit(12 << 20);
     assert!(load(&two).is_ok());
     assert_eq!(load(&two).unwrap_err().exit_code(), 5);
-    assert_eq!(load(&Budget::of((9 << 20) - 1)).unwrap_err().exit_code(), 5);
+    assert_eq!(load(&Budget::with_limit((9 << 20) - 1)).unwrap_err().exit_code(), 5);
 }
 
 /// A file with a hole of many gigabytes takes no place on the disk, and none in memory.

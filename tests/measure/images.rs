@@ -74,7 +74,7 @@ mod metrics {
 
 mod parity {
     use glam::{DVec3, Vec3};
-    use skylit::measure::parity::{Verdict, judge_any, judge_closest, judge_closest_ray, judge_pair};
+    use skylit::measure::parity::{RayVerdict, judge_any, judge_closest, judge_closest_ray, judge_pair};
     use skylit::measure::ray_sets;
     use skylit::oracle::rounding::Rounding;
     use skylit::oracle::{Oracle, OracleHit, OracleRay};
@@ -277,22 +277,22 @@ mod parity {
         let down = |x: f32, z: f32| Ray { origin: [x, 0.5, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
         let hit = |primitive: u32, t: f32| Hit { t, instance: 0, primitive, u: 0.0, v: 0.0 };
         // outer edge: hit or miss; a little further in or out: not
-        assert_eq!(judge(down(1.0, 0.3), Hit::MISS), Verdict::Tie);
-        assert_ne!(judge(down(0.9999, 0.3), Hit::MISS), Verdict::Tie);
+        assert_eq!(judge(down(1.0, 0.3), Hit::MISS), RayVerdict::Tie);
+        assert_ne!(judge(down(0.9999, 0.3), Hit::MISS), RayVerdict::Tie);
         let truth = o.closest(down(0.9999, 0.3));
-        assert_eq!(judge(down(1.000001, 0.3), hit(truth.primitive, 0.5)), Verdict::Tie);
-        assert!(matches!(judge(down(1.0001, 0.3), hit(truth.primitive, 0.5)), Verdict::Unexplained(_)));
+        assert_eq!(judge(down(1.000001, 0.3), hit(truth.primitive, 0.5)), RayVerdict::Tie);
+        assert!(matches!(judge(down(1.0001, 0.3), hit(truth.primitive, 0.5)), RayVerdict::Unexplained(_)));
         // the diagonal that both triangles share: either
         let primitive = o.closest(down(0.5, 0.5)).primitive;
-        assert_eq!(judge(down(0.5, 0.5), hit(primitive ^ 1, 0.5)), Verdict::Tie);
-        assert_eq!(judge(down(0.5, 0.5), hit(primitive, 0.5)), Verdict::Agree);
+        assert_eq!(judge(down(0.5, 0.5), hit(primitive ^ 1, 0.5)), RayVerdict::Tie);
+        assert_eq!(judge(down(0.5, 0.5), hit(primitive, 0.5)), RayVerdict::Agree);
         // t at the ends
         let ended = |tmin, tmax| Ray { tmin, tmax, ..down(0.3, 0.6) };
         let truth = o.closest(down(0.3, 0.6));
-        assert_eq!(judge(ended(0.0, 0.5), hit(truth.primitive, 0.499_999_97)), Verdict::Tie);
-        assert_eq!(judge(ended(0.0, 0.500_000_1), Hit::MISS), Verdict::Tie);
-        assert_eq!(judge(ended(0.499_999_9, 9.0), Hit::MISS), Verdict::Tie);
-        assert!(matches!(judge(ended(0.0, 0.51), Hit::MISS), Verdict::Unexplained(_)));
+        assert_eq!(judge(ended(0.0, 0.5), hit(truth.primitive, 0.499_999_97)), RayVerdict::Tie);
+        assert_eq!(judge(ended(0.0, 0.500_000_1), Hit::MISS), RayVerdict::Tie);
+        assert_eq!(judge(ended(0.499_999_9, 9.0), Hit::MISS), RayVerdict::Tie);
+        assert!(matches!(judge(ended(0.0, 0.51), Hit::MISS), RayVerdict::Unexplained(_)));
         // coincident surfaces: either, and not the same when they are apart
         for (apart, tie) in [(0.0, true), (1e-7, true), (1e-3, false)] {
             let mut s = s.clone();
@@ -304,13 +304,13 @@ mod parity {
             let other = OracleHit { instance: 1, ..o.closest(ray) };
             let floor = (0..2).find(|&p| o.candidates(&OracleRay::from(ray), 0, p, Rounding::default()).any(|c| c.certain));
             let verdict = judge_closest_ray(&o, &ray, &Hit { primitive: floor.unwrap(), ..below }, &other, Rounding::default());
-            assert_eq!(verdict == Verdict::Tie, tie, "{apart}: {verdict:?}");
+            assert_eq!(verdict == RayVerdict::Tie, tie, "{apart}: {verdict:?}");
         }
         // grazing: in the plane of the floor
         let grazing = Ray { origin: [-3.0, 0.0, 0.2], tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: f32::INFINITY };
-        assert_ne!(judge(grazing, Hit::MISS), Verdict::Unexplained("misses a primitive that it certainly hits"));
-        assert!(!matches!(judge(grazing, hit(0, 3.0)), Verdict::Unexplained(_)));
-        assert!(matches!(judge(grazing, hit(0, 7.0)), Verdict::Unexplained(_)), "beyond the floor's extent");
+        assert_ne!(judge(grazing, Hit::MISS), RayVerdict::Unexplained("misses a primitive that it certainly hits"));
+        assert!(!matches!(judge(grazing, hit(0, 3.0)), RayVerdict::Unexplained(_)));
+        assert!(matches!(judge(grazing, hit(0, 7.0)), RayVerdict::Unexplained(_)), "beyond the floor's extent");
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn residual_is_the_share_of_the_old() {
         close(residual(&blend(&truth, &wrong, share), &truth, &wrong, None), share, 1e-6);
     }
     // by hand: d = 1, 2; errors 0.5, 0.5: g = (0.5 + 1) / 5
-    let found = Residual::of(&[0.5, 0.5], &[0.0, 0.0], &[1.0, 2.0], None).unwrap();
+    let found = Residual::from_images(&[0.5, 0.5], &[0.0, 0.0], &[1.0, 2.0], None).unwrap();
     close(found.share, 0.3, 1e-12);
     // left over 0.2 and -0.1: sqrt(2 (0.2^2 + 0.2^2)) / 5
     close(found.standard_error, 0.16f64.sqrt() / 5.0, 1e-12);
@@ -53,10 +53,10 @@ fn residual_is_blind_to_what_the_mask_leaves_out() {
     close(masked(&[1.0, 0.0, 0.0]), 0.5, 1e-12);
     assert!(masked(&[1.0, 0.0, 1.0]).is_nan(), "a broken pixel is not averaged away");
     assert!(masked(&[0.0; 3]).is_nan());
-    assert_eq!(Residual::of(&[0.5], &[0.25], &[0.25], None), None);
-    assert_eq!(Residual::of(&[0.5], &[0.25; 2], &[0.5], None), None);
+    assert_eq!(Residual::from_images(&[0.5], &[0.25], &[0.25], None), None);
+    assert_eq!(Residual::from_images(&[0.5], &[0.25; 2], &[0.5], None), None);
     assert!(residual(&[], &[], &[], None).is_nan());
-    assert_eq!(Residual::of(&[0.5], &[0.0], &[1.0], None).unwrap().standard_error, f64::INFINITY);
+    assert_eq!(Residual::from_images(&[0.5], &[0.0], &[1.0], None).unwrap().standard_error, f64::INFINITY);
 }
 
 /// Noise of mean 0, stronger where it is brighter, moves the residual by no more than its standard error says.
@@ -69,7 +69,7 @@ fn residual_under_noise() {
         let noise = normal(truth.len(), seed + 1);
         let result: Vec<f32> =
             blend(&truth, &wrong, 0.2).iter().zip(&truth).zip(&noise).map(|((v, t), n)| v + 0.3 * t * *n as f32).collect();
-        let found = Residual::of(&result, &truth, &wrong, None).unwrap();
+        let found = Residual::from_images(&result, &truth, &wrong, None).unwrap();
         assert!((found.share - 0.2).abs() < 5.0 * found.standard_error);
         squares += ((found.share - 0.2) / found.standard_error).powi(2);
     }
@@ -148,18 +148,18 @@ fn recovery_is_when_it_stays() {
 
 #[test]
 fn drift_by_hand() {
-    assert_eq!(Drift::of(&[1.0, 2.0]), None);
-    let still = Drift::of(&[0.5; 10]).unwrap();
+    assert_eq!(Drift::from_values(&[1.0, 2.0]), None);
+    let still = Drift::from_values(&[0.5; 10]).unwrap();
     assert!(still.slope == 0.0 && still.standard_error == 0.0 && still.is_level());
     let line: Vec<f64> = (0..10).map(|t| 0.25 * f64::from(t)).collect();
-    let line = Drift::of(&line).unwrap();
+    let line = Drift::from_values(&line).unwrap();
     assert!(line.slope == 0.25 && !line.is_level());
     // 0, 1, 0: no slope; left over -1/3, 2/3, -1/3; neighbours against each other widen nothing
-    let bump = Drift::of(&[0.0, 1.0, 0.0]).unwrap();
+    let bump = Drift::from_values(&[0.0, 1.0, 0.0]).unwrap();
     close(bump.slope, 0.0, 1e-15);
     close(bump.standard_error, (2.0f64 / 3.0 / 2.0).sqrt(), 1e-12);
     assert!(bump.correlation < 0.0 && bump.is_level());
-    assert!(!Drift::of(&[0.0, f64::NAN, 0.0]).unwrap().is_level(), "what is broken does not pass");
+    assert!(!Drift::from_values(&[0.0, f64::NAN, 0.0]).unwrap().is_level(), "what is broken does not pass");
 }
 
 /// Noise alone is level, also noise that a history hands from frame to frame; a drift far below the noise of a frame is not.
@@ -176,11 +176,11 @@ fn drift_under_noise() {
                 Some(*state)
             })
             .collect();
-        passed += usize::from(Drift::of(&noise).unwrap().is_level());
-        passed_smooth += usize::from(Drift::of(&smooth).unwrap().is_level());
+        passed += usize::from(Drift::from_values(&noise).unwrap().is_level());
+        passed_smooth += usize::from(Drift::from_values(&smooth).unwrap().is_level());
         // over the run 0.6 of the deviation of one frame: nearly eight standard errors
         let drifting: Vec<f64> = noise.iter().enumerate().map(|(t, n)| 0.6 * t as f64 / frames as f64 + n).collect();
-        found += usize::from(!Drift::of(&drifting).unwrap().is_level());
+        found += usize::from(!Drift::from_values(&drifting).unwrap().is_level());
     }
     println!("level: {passed} of noise, {passed_smooth} of smooth noise; drift found in {found}");
     assert!(passed >= 97 && passed_smooth >= 96 && found >= 97, "{passed} {passed_smooth} {found}");

@@ -158,7 +158,7 @@ fn gpu_kernels_of_all_features_are_valid() {
         }
     };
     let scene = everything();
-    let features = SceneFeatures::of(&FlatScene::for_paths(&scene));
+    let features = SceneFeatures::from_flat(&FlatScene::for_paths(&scene));
     assert!(features.alpha && features.stochastic_alpha && features.spheres && features.deep_texels, "{features:?}");
     holds(&tracers(&device), &scene, all_needs, &whole);
     // what excludes something of these, with as little else as there can be

@@ -58,7 +58,7 @@ fn gpu_ten_thousand_frames_stay_level() {
             }
         }
         // histories have filled up
-        let drift = Drift::of(&level[4..]).unwrap();
+        let drift = Drift::from_values(&level[4..]).unwrap();
         println!("{kind}: {drift:?} over {} turns of {TURN} frames", level.len() - 4);
         assert!(drift.is_level(), "{kind}: {drift:?}");
         // and what a slope of ever so little error would come to

@@ -314,14 +314,14 @@ fn gpu_what_has_moved_leaves_no_ghost() {
         let mut realtime = realtime(&tracer, SIZE, &settings);
         frames(&mut realtime, &tracer, &camera, 64);
         let image = realtime.result().unwrap();
-        let stale = Residual::of(&image, &truth, &wrong, Some(&floor)).unwrap();
+        let stale = Residual::from_images(&image, &truth, &wrong, Some(&floor)).unwrap();
         assert!((stale.share - 1.0).abs() < 0.05, "{kind}: before the move all is as it was: {stale:?}");
         let moved = tracer.update(&at(places[1])).unwrap().moved;
         assert_eq!(moved.len(), 1);
         let mut shares = Vec::new();
         for frame in 0..8 {
             realtime.frame(&tracer, &camera, if frame == 0 { &moved } else { &[] }).unwrap();
-            shares.push(Residual::of(&realtime.result().unwrap(), &truth, &wrong, Some(&floor)).unwrap());
+            shares.push(Residual::from_images(&realtime.result().unwrap(), &truth, &wrong, Some(&floor)).unwrap());
         }
         // one that knows nothing of the past
         let mut fresh = crate::realtime(&tracer, SIZE, &settings);
@@ -368,7 +368,7 @@ fn gpu_what_a_thin_pole_uncovers_is_what_is_there() {
             let inside = 1..now.len() - 1;
             let is_uncovered = |k: usize| inside.contains(&k) && interior(covered, k, 1) && interior(&now, k, 0);
             let mask: Vec<f32> = (0..now.len()).map(|k| if is_uncovered(k) { 1.0 } else { 0.0 }).collect();
-            let left = Residual::of(&image, &truth, before, Some(&mask)).unwrap();
+            let left = Residual::from_images(&image, &truth, before, Some(&mask)).unwrap();
             println!("{kind}, {preset}: {frames} frames after: {left:?}");
             assert!(left.share.abs() < 0.05 + 3.0 * left.standard_error, "{kind}, {preset}, {frames} frames after: {left:?}");
         }

@@ -539,7 +539,7 @@ fn images_are_environments() {
         ("scene.glb", FileKind::Scene),
         ("no extension", FileKind::Scene),
     ] {
-        assert_eq!(FileKind::of(path), kind, "{path}");
+        assert_eq!(FileKind::from_path(path), kind, "{path}");
     }
     let mut alone = loaded();
     alone.change(|app| app.lighting.environment_turn = Some(90.0));

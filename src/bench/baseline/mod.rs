@@ -201,7 +201,7 @@ mod tests {
     use crate::measure::stats::Percentiles;
 
     fn result(row: &str, values: &[f64]) -> Measurement {
-        let values = Values::Repeated(Percentiles::of(values).unwrap());
+        let values = Values::Repeated(Percentiles::from_values(values).unwrap());
         Measurement {
             scene: row.into(),
             part: String::new(),

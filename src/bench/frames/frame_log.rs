@@ -181,7 +181,7 @@ impl FrameLog {
 
 fn cost_of(frames: &[&TimedFrame]) -> FrameCost {
     let ms = |values: &mut dyn Iterator<Item = f64>| {
-        Percentiles::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+        Percentiles::from_values(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
     };
     let mean =
         |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_share_of_samples() {
-        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::of(&[ms]).unwrap() };
+        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::from_values(&[ms]).unwrap() };
         let cost = FrameCost {
             passes: vec![pass("path_camera", 1.0), pass("path_bounce", 2.0), pass("filter", 1.0)],
             ..FrameCost::default()

@@ -133,7 +133,7 @@ fn measure_preset(
     row.exact(quantity::UNFILTERED, ImageErrors::mean(&unfiltered).map(|e| e.rmse));
     plain_image.add_to(&mut row, &errors);
     denoised.iter().for_each(|image| image.add_to(&mut row));
-    row.repeated(quantity::UPDATE_TIME, Percentiles::of(&updates));
+    row.repeated(quantity::UPDATE_TIME, Percentiles::from_values(&updates));
     if motion.moves_objects() {
         let left = shares.iter().sum::<f64>() / shares.len() as f64;
         row.exact(plain("left", ""), left).exact(plain("ghosting", ""), ghosting.energy());

@@ -85,7 +85,7 @@ fn measure_scene(session: &mut FramesSession, source: &str) -> Result<()> {
     row.exact(plain("time", "ms"), 1e3 * build_seconds).exact(plain("upload", "ms"), 1e3 * upload_seconds);
     let top = if is_rebuilt { "top level, built" } else { "top level, refitted" };
     for (name, times) in [(top, &tops), ("mesh, refitted", &refits), ("mesh, built", &rebuilds)] {
-        session.record.row(source, PART, name).repeated(quantity::UPDATE_TIME, Percentiles::of(times));
+        session.record.row(source, PART, name).repeated(quantity::UPDATE_TIME, Percentiles::from_values(times));
     }
     let described = session.record.scene(source);
     described.about = format!(

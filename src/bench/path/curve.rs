@@ -90,10 +90,10 @@ impl ErrorCurve {
         let mut row = record.row(scene, PART, &self.name).of_peer(self.is_peers);
         for p in &self.points {
             let mut at = row.at(SPP, f64::from(p.spp));
-            at.repeated(quantity::IMAGE_TIME, Percentiles::of(&p.seconds));
+            at.repeated(quantity::IMAGE_TIME, Percentiles::from_values(&p.seconds));
             // what is less than the reference's own error says nothing
             let error = if p.is_unsure { quantity::RMSE.not_compared() } else { quantity::RMSE };
-            at.repeated(error, Percentiles::of(&p.rmse_repeats));
+            at.repeated(error, Percentiles::from_values(&p.rmse_repeats));
             at.exact(plain("mean RMSE", ""), p.rmse).exact(plain("bad pixels", ""), p.bad_pixels);
         }
         let Some(last) = self.points.last() else { return };

@@ -209,7 +209,8 @@ impl RaySession<'_> {
             for run in &runs {
                 let mut row = self.record.row(source, stream.name, &run.name).of_peer(run.is_peers);
                 let mut row = row.at(SIZE, size);
-                let rates = |seconds: &[f64]| Percentiles::of(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>());
+                let rates =
+                    |seconds: &[f64]| Percentiles::from_values(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>());
                 row.repeated(quantity::RATE, rates(&run.seconds));
                 row.repeated(plain("wall rate", "Mrays/s"), run.wall_seconds.as_deref().and_then(rates));
                 row.exact(plain("traced", "rays"), run.rays).exact(plain("hit share", ""), run.hit_share);

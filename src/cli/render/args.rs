@@ -30,7 +30,8 @@ Examples:
   skylit render scene.glb -o ao.png --eye 3,2,5 --target 0,1,0      from here
   skylit render scene.glb -o turn.apng --preset balanced --orbit --frames 0..240     in real time";
 
-/// Frames whose files are compared with those that are read, and with each other, before anything is rendered: over an hour of film.
+/// Frames whose files are compared with those that are read, and with each other, before anything
+/// is rendered: over an hour of film.
 const MAX_PLANNED_FRAMES: u32 = 100_000;
 
 /// `skylit render`.
@@ -100,7 +101,8 @@ impl RenderArgs {
         self.writes_exr() || self.files.has_deep_png() || self.tev.is_some()
     }
 
-    /// These arguments with the settings of [`RenderArgs::settings_file`] where none were given, and with defaults where neither gives any.
+    /// These arguments with the settings of [`RenderArgs::settings_file`] where none were given,
+    /// and with defaults where neither gives any.
     ///
     /// # Errors
     /// Those of [`RenderSettings::load`] and [`ConfigArgs::files`].
@@ -123,6 +125,8 @@ impl RenderArgs {
         self.device.check()?;
         self.settings.check()?;
         let wrong = |text: String| Err(Error::Usage(text));
+
+        // options that need a certain kind of file
         if self.settings.frames.show.is_some() && !self.writes_picture() {
             return wrong("--show is for pictures (.png, .jpg, .webp, .apng): for an .exr use --aov".into());
         }
@@ -136,6 +140,8 @@ impl RenderArgs {
         } else if self.continues {
             return wrong("--continue is for stills of several frames: add --frames A..B and --spp N, or leave it out".into());
         }
+
+        // options of stills alone
         let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));
         let formats = images.map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
@@ -147,6 +153,8 @@ impl RenderArgs {
         if let (Some(frames), Some((_, option, remedy))) = (frames, of_stills.iter().find(|o| o.0)) {
             return wrong(format!("{option} is for stills, and {} selects frames in real time: {remedy}", frames.option()));
         }
+
+        // options that need a certain integrator or channel
         if self.dump_rays.is_some() {
             let applies = AppliesTo::stills_of(Capability::KeptRays);
             let dump_rays = GivenSetting { name: "dump_rays", applies };
@@ -160,6 +168,7 @@ impl RenderArgs {
         {
             return wrong(format!("--depth-image {}: the name must end in .png or .exr", path.display()));
         }
+
         self.check_files()?;
         self.check_film()
     }
@@ -201,7 +210,8 @@ impl RenderArgs {
     /// The files that it reads, as far as the command line tells, and those that it will write.
     ///
     /// # Errors
-    /// Those of [`FramePattern::of`], and [`Error::Usage`] for a file that would replace the one of `--resume` and is no image.
+    /// Those of [`FramePattern::of`], and [`Error::Usage`] for a file that would replace the one of
+    /// `--resume` and is no image.
     pub fn plan(&self, defaults: &[DefaultsReport]) -> Result<FilePlan> {
         let (mut plan, settings) = (FilePlan::default(), &self.settings);
 

@@ -18,20 +18,21 @@ pub struct FrameFiles {
     settings: FileSettings,
 }
 
-/// What is written of a frame. What no file needs is `None`.
+/// Images of a frame that are written. Those that no file needs are `None`.
 pub struct FrameContents<'a> {
-    /// Its channels.
+    /// Channels of the frame.
     pub image: Option<&'a Image>,
-    /// Its values as pictures show them, linear: for pictures of more than 8 bits.
+    /// Values as pictures show them, linear: for pictures of more than 8 bits.
     pub deep: Option<Image>,
-    /// Its display ([`crate::renderer::Frames::displayed`]).
+    /// Display of the frame ([`crate::renderer::Frames::displayed`]).
     pub shown: Option<&'a Buffer>,
-    /// Its coverage.
+    /// Coverage of the pixels, 0 to 1.
     pub coverage: Option<Vec<f32>>,
 }
 
 impl FrameFiles {
-    /// Starts the animations, which appear when [`FrameFiles::finish`] is called. `colour`: colour type of what is displayed.
+    /// Starts the animations, which appear when [`FrameFiles::finish`] is called. `colour`: colour
+    /// type of what is displayed.
     pub fn create(
         outputs: &[PathBuf],
         size: [u32; 2],
@@ -52,7 +53,8 @@ impl FrameFiles {
         Ok(Self { images, pictures, animations, colour, settings: settings.clone() })
     }
 
-    /// Writes a frame: its channels to .exr files and to .png files that 8 bits do not suffice for, and its display to other files and animations.
+    /// Writes a frame: its channels to .exr files and to .png files that 8 bits do not suffice for,
+    /// and its display to other files and animations.
     pub fn add(&mut self, number: u32, size: [u32; 2], contents: &FrameContents) -> Result<()> {
         let number = u64::from(number);
         if let Some(image) = contents.image {

@@ -43,14 +43,18 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     }
 }
 
-/// A still for each frame. A frame's files are written when it is finished, so a run that was ended goes on with `--continue`.
+/// A still for each frame. A frame's files are written when it is finished, so a run that was ended
+/// goes on with `--continue`.
 fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
     timeline.check_outputs(&args.output)?;
     let range = timeline.range();
+
+    // files are checked before anything is loaded
     let files_of =
         |number: u32| args.output.iter().map(|p| output::frames::numbered(p, u64::from(number))).collect::<Result<Vec<_>>>();
     files_of(range.first)?.iter().try_for_each(|path| files::check_writable(path))?;
+
     interrupt::install();
     let console = args.verbosity.console();
     let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
@@ -59,6 +63,8 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     let mut progress = Progress::new("rendering frames", &console);
     let (mut records, mut warnings, mut finished) = (Vec::new(), Vec::new(), 0);
     let choices = stills.choices().to_vec();
+
+    // a still whose files are finished is not rendered again
     for number in range.first..range.end {
         interrupt::check()?;
         progress.set(u64::from(number - range.first), u64::from(range.end - range.first));
@@ -71,6 +77,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
             finished += 1;
             continue;
         }
+
         let still = stills.render(number, &mut SilentControl)?;
         paths.iter().try_for_each(|path| still.save_with(path, &args.files))?;
         let mut record = still.report.record(args.explain);
@@ -85,6 +92,8 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         records.push(record);
     }
     drop(progress);
+
+    // totals of all stills
     let seconds = start.elapsed().as_secs_f64();
     let skipped = if finished > 0 { format!(", {finished} finished before") } else { String::new() };
     console.line(&format!(
@@ -95,6 +104,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         args.settings.image.spp.unwrap_or(0)
     ))?;
     choices.iter().try_for_each(|choice| console.line(choice))?;
+
     let record = serde_json::json!({
         "stills": records,
         "finished_before": finished,
@@ -110,6 +120,8 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     for path in args.outputs() {
         files::check_writable(&path)?;
     }
+
+    // the scene, and what it makes impossible
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
@@ -120,23 +132,28 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
         let what = "--background has no effect: the environment is behind the scene, in its colours; leave --background out, or render without an environment";
         return Err(Error::Usage(what.into()).into());
     }
+
+    // a still whose partial images are written, too, has more files
     let intervals =
         crate::renderer::still::intervals(&args.settings, &renderer.scene().hints, args.settings.spp(renderer.scene()));
     check_intervals(args, plan.clone(), &intervals, &renderer.scene().report.files)?;
+
     let mut control = CliControl::new(args, console);
     let extras = StillExtras {
         keep_rays: args.dump_rays.is_some(),
         aov: args.depth_image.is_some(),
         intermediate: viewer.tev.is_some(),
     };
-    let still = renderer.still_with(&args.settings, extras, &mut control, &mut |on_way| {
-        viewer.show(on_way.image);
-        if !intervals.contains(&on_way.samples) {
+    let still = renderer.still_with(&args.settings, extras, &mut control, &mut |partial| {
+        viewer.show(partial.image);
+        if !intervals.contains(&partial.samples) {
             return Ok(());
         }
-        args.output.iter().try_for_each(|path| on_way.save_with(&interval_path(path, on_way.samples), &args.files))
+        args.output.iter().try_for_each(|path| partial.save_with(&interval_path(path, partial.samples), &args.files))
     })?;
     drop(control);
+
+    // files, whose time counts
     let write_start = Instant::now();
     write_rays(args, &still.rays)?;
     if let Some(path) = &args.depth_image {
@@ -144,6 +161,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     }
     args.output.iter().try_for_each(|path| still.save_with(path, &args.files))?;
     viewer.show(&still.image);
+
     let mut report = still.report;
     report.setup.warnings.extend(viewer.warning);
     report.seconds.finish(write_start.elapsed().as_secs_f64(), start.elapsed().as_secs_f64());
@@ -153,6 +171,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     if report.setup.wants_depth_image && args.depth_image.is_none() {
         console.line("the scene requests a depth image: add --depth-image FILE")?;
     }
+
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(files::lossy(&args.output));
     record["defaults"] = serde_json::json!(defaults);
@@ -162,6 +181,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
 
 fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
+
     // report invalid settings before anything is loaded
     crate::renderer::frames::frame_settings(&args.settings)?;
     timeline.check_outputs(&args.output)?;
@@ -169,18 +189,23 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     for path in &args.output {
         files::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
     }
+
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
     let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
+
+    // a file for each frame, or one for all
     let mut control = CliControl::new(args, console);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = frames.colour();
     let mut files =
         FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour, &args.files)?;
     let (mut done, all, mut write_seconds) = (0, u64::from(frames.count()), 0.0);
+
+    // only frames that are kept are read back
     while let Some(frame) = frames.advance()? {
         if frame.kept {
             let write_start = Instant::now();
@@ -196,6 +221,8 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         control.progress(done, all);
         interrupt::check()?;
     }
+
+    // totals of all frames
     files.finish()?;
     drop(control);
     let mut report = frames.report();
@@ -207,13 +234,15 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     for line in report.lines(&names(args), args.explain) {
         console.line(&line)?;
     }
+
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(files::lossy(&args.output));
     record["defaults"] = serde_json::json!(defaults);
     console.close(&record, Ok(()))
 }
 
-/// The viewer tev, if it is to show images. A connection that ends is a warning: the render goes on without it.
+/// The viewer tev, if it is to show images. A connection that ends is a warning: the render goes on
+/// without it.
 struct Viewer {
     tev: Option<TevViewer>,
     console: Console,
@@ -274,7 +303,8 @@ fn names(args: &RenderArgs) -> String {
     args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Checks before rendering starts that intermediate images can be written, and take the place of no other file.
+/// Checks before rendering starts that intermediate images can be written, and take the place of no
+/// other file.
 fn check_intervals(args: &RenderArgs, mut plan: FilePlan, intervals: &[u32], scene_files: &[PathBuf]) -> Result<()> {
     for path in &args.output {
         intervals.iter().for_each(|&n| plan.writes("an intermediate image", interval_path(path, n)));
@@ -323,8 +353,8 @@ mod tests {
 
     #[test]
     fn names_of_intervals() {
-        let of = |path: &str, n: u32| interval_path(path.as_ref(), n).to_string_lossy().into_owned();
-        assert_eq!(of("out/a.exr", 16), "out/a.0016.exr");
-        assert_eq!(of("a.b.png", 65536), "a.b.65536.png");
+        let numbered = |path: &str, n: u32| interval_path(path.as_ref(), n).to_string_lossy().into_owned();
+        assert_eq!(numbered("out/a.exr", 16), "out/a.0016.exr");
+        assert_eq!(numbered("a.b.png", 65536), "a.b.65536.png");
     }
 }

@@ -20,7 +20,8 @@ const DEFAULT_PORT: u16 = 14158;
 const PATIENCE: Duration = Duration::from_secs(10);
 /// How often it is looked whether the user has interrupted the program.
 const INTERVAL: Duration = Duration::from_millis(50);
-/// Most values in a packet: its length has 32 bits, and a viewer that draws is not to wait for long.
+/// Most values in a packet: its length has 32 bits, and a viewer that draws is not to wait for
+/// long.
 const MAX_VALUES: usize = 1 << 20;
 /// The layer of channels that are of no use in a viewer: the film's sums.
 const STATE: &str = "state.";
@@ -69,7 +70,7 @@ pub struct TevViewer {
 pub enum SendError {
     /// The user has interrupted the program.
     Interrupted,
-    /// What is wrong with the viewer or the connection.
+    /// The viewer or the connection fails, for this reason.
     Failed(String),
 }
 
@@ -120,29 +121,35 @@ impl TevViewer {
         Err(last)
     }
 
-    /// Shows an image in place of the one before: all channels but the film's sums; ids as the nearest floats. The viewer has [`PATIENCE`] for all of it. After an error
-    /// the connection is of no use any more.
+    /// Shows an image in place of the one before: all channels but the film's sums; ids as the
+    /// nearest floats. The viewer has [`PATIENCE`] for all of it. After an error the connection is
+    /// of no use any more.
     ///
     /// # Errors
     /// Those of the connection, and Ctrl-C.
     pub fn send(&mut self, image: &Image) -> Result<(), SendError> {
         let channels: Vec<&Channel> = image.channels.iter().filter(|c| !c.name.starts_with(STATE)).collect();
         let values = u64::from(image.width) * u64::from(image.height) * channels.len() as u64;
+
         let (sent, socket, patience) = (AtomicU64::new(0), &self.socket, self.patience);
         let sender = Sender { client: &mut self.client, name: &self.name, shown: &mut self.shown, sent: &sent };
         let (start, caller) = (Instant::now(), std::thread::current());
-        // a viewer that reads a little now and then keeps every single write alive: they are made on a thread, and all of them have one time limit
+        // a viewer that reads a little now and then keeps every single write alive: they are made
+        // on a thread, and all of them have one time limit
         let (outcome, ended) = std::thread::scope(|scope| {
             let work = move || {
                 let outcome = sender.send(image, &channels);
                 caller.unpark();
                 outcome
             };
+
             let thread = std::thread::Builder::new().name("tev".into()).spawn_scoped(scope, work);
             let thread = match thread {
                 Ok(thread) => thread,
                 Err(e) => return (Err(e), None),
             };
+
+            // until all is sent, the user interrupts, or the time is over
             let mut ended = None;
             while !thread.is_finished() {
                 let why = match () {
@@ -167,6 +174,7 @@ impl TevViewer {
             let outcome = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             (outcome, ended)
         });
+
         match (ended, outcome) {
             (Some(ended), _) => Err(ended),
             (None, outcome) => outcome.map_err(|e| SendError::Failed(e.to_string())),
@@ -233,7 +241,8 @@ mod tests {
 
     use super::*;
 
-    /// A viewer that reads a little now and then keeps every write alive, and is left alone after its time for the image.
+    /// A viewer that reads a little now and then keeps every write alive, and is left alone after
+    /// its time for the image.
     #[test]
     fn a_viewer_that_drips_is_left() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -260,14 +269,14 @@ mod tests {
 
     #[test]
     fn addresses() {
-        let of = |text: &str| text.parse::<TevAddress>().map(|a| (a.host, a.port));
-        let is = |text: &str, host: &str, port| assert_eq!(of(text), Ok((host.to_owned(), port)), "{text}");
+        let address = |text: &str| text.parse::<TevAddress>().map(|a| (a.host, a.port));
+        let is = |text: &str, host: &str, port| assert_eq!(address(text), Ok((host.to_owned(), port)), "{text}");
         is("localhost", "localhost", 14158);
         is("10.0.0.7:99", "10.0.0.7", 99);
         is("[::1]", "::1", 14158);
         is("[::1]:5", "::1", 5);
         for bad in ["", ":5", "host:", "host:0", "host:70000", "::1", "a b"] {
-            assert!(of(bad).is_err_and(|e| e.contains("HOST:PORT")), "{bad}");
+            assert!(address(bad).is_err_and(|e| e.contains("HOST:PORT")), "{bad}");
         }
     }
 }

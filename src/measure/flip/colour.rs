@@ -1,5 +1,5 @@
-//! The colour spaces of FLIP: linear sRGB to opponent colours, in which the eye's blur is applied, and to CIE L\*a\*b\* with
-//! Hunt's adjustment, in which colours are told apart.
+//! The colour spaces of FLIP: linear sRGB to opponent colours, in which the eye's blur is applied,
+//! and to CIE L\*a\*b\* with Hunt's adjustment, in which colours are told apart.
 
 use glam::{DMat3, Mat3, Vec3};
 
@@ -36,8 +36,9 @@ impl Space {
 
     /// Luminance, red against green, yellow against blue: (y, x - y, y - z).
     ///
-    /// The paper's YCxCz is (116 y - 16, 500 (x - y), 200 (y - z)). Filters whose weights add up to one commute with that
-    /// scaling, so it is left out; and this y is what the paper normalises Y to before it looks for edges.
+    /// The paper's YCxCz is (116 y - 16, 500 (x - y), 200 (y - z)). Filters whose weights add up to
+    /// one commute with that scaling, so it is left out; and this y is what the paper normalises Y
+    /// to before it looks for edges.
     pub fn opponent(&self, rgb: Vec3) -> Vec3 {
         let v = self.to_xyz * rgb;
         Vec3::new(v.y, v.x - v.y, v.y - v.z)
@@ -48,7 +49,8 @@ impl Space {
         self.lab((self.to_rgb * Vec3::new(c.x + c.y, c.x, c.x - c.z)).clamp(Vec3::ZERO, Vec3::ONE))
     }
 
-    /// Linear sRGB to CIE L\*a\*b\*, a\* and b\* scaled by L\* / 100: differences in hue count less where it is dark (Hunt 1952).
+    /// Linear sRGB to CIE L\*a\*b\*, a\* and b\* scaled by L\* / 100: differences in hue count less
+    /// where it is dark (Hunt 1952).
     pub fn lab(&self, rgb: Vec3) -> Vec3 {
         let v = self.to_xyz * rgb;
         let (x, y, z) = (response(v.x), response(v.y), response(v.z));
@@ -62,7 +64,8 @@ pub fn lightness(y: f32) -> f32 {
     116.0 * response(y) - 16.0
 }
 
-/// HyAB distance of two L\*a\*b\* colours (Abasi et al. 2020): city block in lightness, Euclidean in colour.
+/// HyAB distance of two L\*a\*b\* colours (Abasi et al. 2020): city block in lightness, Euclidean
+/// in colour.
 pub fn hyab(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + d.y.hypot(d.z)

@@ -1,5 +1,5 @@
-//! The filters of FLIP. All of them are products of a filter along x and one along y, or a sum of two such products, and are
-//! applied so.
+//! The filters of FLIP. All of them are products of a filter along x and one along y, or a sum of
+//! two such products, and are applied so.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ impl Kernel {
         self.0.len() / 2
     }
 
-    fn of(taps: &[f64]) -> Self {
+    fn from_taps(taps: &[f64]) -> Self {
         Self(taps.iter().map(|&v| v as f32).collect())
     }
 }
@@ -23,9 +23,9 @@ impl Kernel {
 pub struct Filters {
     /// Contrast sensitivity to luminance.
     pub achromatic: Kernel,
-    /// To red against green.
+    /// Contrast sensitivity to red against green.
     pub red_green: Kernel,
-    /// To blue against yellow: two filters, and the share of each.
+    /// Contrast sensitivity to blue against yellow: two filters, and the share of each.
     pub blue_yellow: [(Kernel, f32); 2],
     /// A feature detector's weights across its direction.
     pub across: Kernel,
@@ -62,9 +62,9 @@ impl Filters {
             achromatic: trimmed(&sensitivity(A)),
             red_green: trimmed(&sensitivity(RG)),
             blue_yellow,
-            across: Kernel::of(&balanced(sampled(reach, gauss))),
-            edge: Kernel::of(&balanced(sampled(reach, |x| -x * gauss(x)))),
-            point: Kernel::of(&balanced(sampled(reach, |x| (x * x / (deviation * deviation) - 1.0) * gauss(x)))),
+            across: Kernel::from_taps(&balanced(sampled(reach, gauss))),
+            edge: Kernel::from_taps(&balanced(sampled(reach, |x| -x * gauss(x)))),
+            point: Kernel::from_taps(&balanced(sampled(reach, |x| (x * x / (deviation * deviation) - 1.0) * gauss(x)))),
         }
     }
 
@@ -101,7 +101,7 @@ fn trimmed(taps: &[f64]) -> Kernel {
     let peak = taps[taps.len() / 2];
     let nothing = taps.iter().take_while(|v| **v < 1e-9 * peak).count();
     let kept = &taps[nothing..taps.len() - nothing];
-    Kernel::of(&balanced(kept.to_vec()))
+    Kernel::from_taps(&balanced(kept.to_vec()))
 }
 
 /// Rows of one number a pixel.
@@ -119,7 +119,8 @@ impl Plane {
         Self { width, values: vec![0.0; width * rows] }
     }
 
-    /// Filtered along x; the rows lose `margin` values at either end, at least the radius of the filter.
+    /// Filtered along x; the rows lose `margin` values at either end, at least the radius of the
+    /// filter.
     pub fn along_x(&self, kernel: &Kernel, margin: usize) -> Self {
         let mut out = Self::new(self.width - 2 * margin, self.values.len() / self.width);
         let start = margin - kernel.radius();
@@ -131,7 +132,8 @@ impl Plane {
         out
     }
 
-    /// Filtered along y, times `scale`, added to `out`, which has `margin` rows less at either end, at least the radius.
+    /// Filtered along y, times `scale`, added to `out`, which has `margin` rows less at either end,
+    /// at least the radius.
     pub fn add_along_y(&self, kernel: &Kernel, margin: usize, scale: f32, out: &mut Self) {
         let start = margin - kernel.radius();
         for (y, into) in out.values.chunks_exact_mut(self.width).enumerate() {

@@ -1,7 +1,8 @@
 //! FLIP of images whose values exceed what a display shows.
 //!
-//! After Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing Errors in Rendered High Dynamic Range Images" (Eurographics 2021, short papers): the images
-//! are tone mapped at several exposures, and a pixel's error is the largest of them.
+//! After Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing Errors in Rendered High
+//! Dynamic Range Images" (Eurographics 2021, short papers): the images are tone mapped at several
+//! exposures, and a pixel's error is the largest of them.
 
 use rayon::prelude::*;
 
@@ -10,12 +11,13 @@ use super::flip;
 use crate::Result;
 use crate::measure::metrics::ImagePair;
 
-/// Tone-mapped luminance that the brightest pixel and the median one have at the first and the last exposure.
+/// Tone-mapped luminance that the brightest pixel and the median one have at the first and the last
+/// exposure.
 const TARGET: f64 = 0.85;
 /// The least median luminance: that of a mostly black image would ask for endless exposures.
 const MIN_MEDIAN: f64 = f32::EPSILON as f64;
-/// Numerator and denominator of the tone mapping operator (Narkowicz's fit of ACES, with the pre-exposure of 0.6 that the paper takes out):
-/// (c0 x^2 + c1 x) / (d0 x^2 + d1 x + d2).
+/// Numerator and denominator of the tone mapping operator (Narkowicz's fit of ACES, with the
+/// pre-exposure of 0.6 that the paper takes out): (c0 x^2 + c1 x) / (d0 x^2 + d1 x + d2).
 const NUMERATOR: [f64; 2] = [0.6 * 0.6 * 2.51, 0.6 * 0.03];
 const DENOMINATOR: [f64; 3] = [0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
 
@@ -32,7 +34,8 @@ pub struct HdrFlip {
     pub exposures: u32,
 }
 
-/// As [`flip`], for linear values of any size. The exposures follow from the reference; `None` if that has no luminance above 0.
+/// As [`flip`], for linear values of any size. The exposures follow from the reference; `None` if
+/// that has no luminance above 0.
 ///
 /// # Errors
 /// Those of [`flip`].
@@ -52,7 +55,8 @@ pub fn flip_hdr(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Resul
     Ok(Some(HdrFlip { map, mean, stops, exposures }))
 }
 
-/// The exposures, in stops, that bring the greatest and the median luminance of the reference, over the pixels that count, to [`TARGET`].
+/// The exposures, in stops, that bring the greatest and the median luminance of the reference, over
+/// the pixels that count, to [`TARGET`].
 fn exposure_range(pair: &ImagePair) -> Option<[f64; 2]> {
     let mut luminances: Vec<f32> = match pair.channels {
         3 => pair.reference.par_chunks_exact(3).map(|p| luminance(p[0], p[1], p[2])).collect(),

@@ -1,9 +1,11 @@
 //! FLIP: how large the difference between two images looks to someone who flips between them.
 //!
-//! After Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating
-//! Images" (HPG 2020), the variant for images that a display shows as they are: linear RGB in [0, 1], what lies beyond is
-//! clamped; [`flip_hdr`] is the one for any values. Written from the papers. Colours are blurred as the eye blurs them, told apart in a perceptually even space, and
-//! the result is raised where one image has an edge or a point that the other lacks.
+//! After Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference
+//! Evaluator for Alternating Images" (HPG 2020), the variant for images that a display shows as
+//! they are: linear RGB in [0, 1], what lies beyond is clamped; [`flip_hdr`] is the one for any
+//! values. Written from the papers. Colours are blurred as the eye blurs them, told apart in a
+//! perceptually even space, and the result is raised where one image has an edge or a point that
+//! the other lacks.
 
 mod colour;
 mod filters;
@@ -21,7 +23,8 @@ use crate::{Error, Result};
 
 pub use self::hdr::{HdrFlip, flip_hdr};
 
-/// The paper's viewing conditions: a display of 3840 pixels over 0.7 m, seen from 0.7 m; about 67 pixels a degree.
+/// The paper's viewing conditions: a display of 3840 pixels over 0.7 m, seen from 0.7 m; about 67
+/// pixels a degree.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 
 /// Exponent of colour differences (qc).
@@ -36,7 +39,8 @@ const FEATURE_EXPONENT: f32 = 0.5;
 /// Rows worked on at a time: filters see beyond them, so few rows waste work, many rows memory.
 const BAND: usize = 64;
 
-/// Pixels a degree of visual angle, of a display `width` metres and `pixels` pixels wide, seen from `distance` metres.
+/// Pixels a degree of visual angle, of a display `width` metres and `pixels` pixels wide, seen from
+/// `distance` metres.
 pub fn pixels_per_degree(distance: f64, width: f64, pixels: f64) -> f64 {
     distance * (pixels / width) * std::f64::consts::PI / 180.0
 }
@@ -44,18 +48,20 @@ pub fn pixels_per_degree(distance: f64, width: f64, pixels: f64) -> f64 {
 /// How different two images look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flip {
-    /// The error of each pixel, covered or not, in [0, 1]: 0 looks the same. NaN where a value is not finite.
+    /// The error of each pixel, covered or not, in [0, 1]: 0 looks the same. NaN where a value is
+    /// not finite.
     pub map: Vec<f32>,
     /// Mean over the pixels that count; NaN for none, or when one of them is broken.
     pub mean: f64,
 }
 
-/// Compares images of 1 channel (grey) or 3 (RGB), linear, in rows of `width` pixels. What coverage leaves out is not counted,
-/// but is seen by the eye beside what is; values that are not finite are seen as black. `pixels_per_degree` is in [1, 10000],
-/// commonly [`PIXELS_PER_DEGREE`].
+/// Compares images of 1 channel (grey) or 3 (RGB), linear, in rows of `width` pixels. What coverage
+/// leaves out is not counted, but is seen by the eye beside what is; values that are not finite are
+/// seen as black. `pixels_per_degree` is in [1, 10000], commonly [`PIXELS_PER_DEGREE`].
 ///
 /// # Errors
-/// [`Error::Usage`] for other numbers of channels, a width that does not divide the image, or pixels per degree out of range.
+/// [`Error::Usage`] for other numbers of channels, a width that does not divide the image, or
+/// pixels per degree out of range.
 pub fn flip(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Result<Flip> {
     let wrong = |what: &str| Err(Error::Usage(format!("cannot compute FLIP: {what}")));
     let (channels, pixels) = (pair.channels, pair.image.len() / pair.channels);
@@ -85,7 +91,8 @@ pub fn flip(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Result<Fl
     Ok(Flip { map, mean })
 }
 
-/// Section 4.3 of the paper: the error of a pixel from the HyAB distance and the difference of its features.
+/// Section 4.3 of the paper: the error of a pixel from the HyAB distance and the difference of its
+/// features.
 fn combined(difference: f32, feature: f32, greatest: f32) -> f32 {
     let (d, knee) = (difference.powf(COLOUR_EXPONENT), KNEE * greatest);
     // large differences are squeezed into what is left above the knee
@@ -109,7 +116,7 @@ impl Eye {
         hyab(self.space.lab(Vec3::Y), self.space.lab(Vec3::Z)).powf(COLOUR_EXPONENT)
     }
 
-    /// What of the given rows reaches the brain.
+    /// Filters the given rows as the eye does, into colours and features.
     fn see(&self, image: &[f32], rows: Range<usize>) -> Seen {
         let (f, margin) = (&self.filters, self.filters.reach());
         let planes = self.opponent(image, rows, margin);
@@ -134,8 +141,8 @@ impl Eye {
         Seen { colours, edge, point }
     }
 
-    /// Opponent colours of some rows (luminance alone of a grey image), with `margin` more pixels on every side: the image's
-    /// own where it has some, else its outermost.
+    /// Opponent colours of some rows (luminance alone of a grey image), with `margin` more pixels
+    /// on every side: the image's own where it has some, else its outermost.
     fn opponent(&self, image: &[f32], rows: Range<usize>, margin: usize) -> Vec<Plane> {
         let shown = |v: f32| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 };
         let (width, count) = (self.width + 2 * margin, rows.len() + 2 * margin);
@@ -164,7 +171,7 @@ impl Eye {
     }
 }
 
-/// What is seen of some rows: one entry a pixel.
+/// Colours and features that are seen of some rows: one entry a pixel.
 struct Seen {
     /// L\*a\*b\*, adjusted.
     colours: Vec<Vec3>,

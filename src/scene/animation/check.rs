@@ -6,6 +6,8 @@ use crate::scene::{Geometry, Scene};
 /// Fails with a message that names the invalid part.
 pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
     let nodes = parts.nodes.len();
+
+    // nodes: after their parents, and finite
     for (i, node) in parts.nodes.iter().enumerate() {
         let name = &node.name;
         if node.parent.is_some_and(|p| p >= i) {
@@ -18,6 +20,8 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
             return Err(format!("node {i} `{name}` has a morph weight that is not finite"));
         }
     }
+
+    // skins, deformations and channels refer to them
     for (i, skin) in parts.skins.iter().enumerate() {
         check_skin(skin, nodes).map_err(|e| format!("skin {i} `{}`: {e}", skin.name))?;
     }
@@ -34,6 +38,8 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
     for (i, animation) in parts.animations.iter().enumerate() {
         check_animation(animation, parts).map_err(|e| format!("animation {i} `{}`, {e}", animation.name))?;
     }
+
+    // what nodes carry
     let on = |what: &str, carried: &[Option<usize>], there: usize| {
         // lights are added to scenes that have a rig
         if carried.len() != there && (what != "lights" || carried.len() > there) {
@@ -68,6 +74,8 @@ fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &RigParts)
     };
     let vertices = triangles.positions.len();
     let node = parts.nodes.get(deformation.node).ok_or_else(|| format!("node {} does not exist", deformation.node))?;
+
+    // joints and weights: as many as vertices, of joints that exist
     let joints = match deformation.skin {
         None if deformation.influences.is_empty() => 0,
         None => return Err("has joints and weights, but no skin".to_owned()),
@@ -92,6 +100,8 @@ fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &RigParts)
             }
         }
     }
+
+    // morph targets: as many as weights, of the mesh's size
     if !deformation.targets.is_empty() && node.weights.len() != deformation.targets.len() {
         let (targets, weights) = (deformation.targets.len(), node.weights.len());
         return Err(format!("has {targets} morph targets, its node {} {weights} weights", deformation.node));

@@ -14,7 +14,8 @@ pub struct Influences {
     pub weights: Vec<[f32; 4]>,
 }
 
-/// A morph target: differences to the mesh at weight one. Each array is empty (all zero) or has one element per vertex.
+/// A morph target: differences to the mesh at weight one. Each array is empty (all zero) or has one
+/// element per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MorphTarget {
     /// Displacements of positions.
@@ -28,8 +29,8 @@ pub struct MorphTarget {
 pub struct Deformation {
     /// Index into [`crate::scene::Scene::meshes`].
     pub mesh: usize,
-    /// Index into [`super::RigParts::nodes`] of the node of the mesh, which has the weights of its morph targets. The node's transform does
-    /// not apply to a skinned mesh.
+    /// Index into [`super::RigParts::nodes`] of the node of the mesh, which has the weights of its
+    /// morph targets. The node's transform does not apply to a skinned mesh.
     pub node: usize,
     /// Index into [`super::RigParts::skins`].
     pub skin: Option<usize>,
@@ -46,7 +47,8 @@ pub struct VertexData {
     pub positions: Vec<Vec3>,
     /// Unit normals.
     pub normals: Vec<Vec3>,
-    /// Unit tangents, handedness in w: those of normal maps, and those of clearcoats and of anisotropy where they differ.
+    /// Unit tangents, handedness in w: those of normal maps, and those of clearcoats and of
+    /// anisotropy where they differ.
     pub tangents: [Vec<Vec4>; 3],
 }
 
@@ -72,12 +74,13 @@ impl Deformation {
             && self.targets.iter().all(|t| t.positions.is_empty() || t.positions[a] == t.positions[b])
     }
 
-    /// Whether a triangle that is degenerate in the undeformed mesh is degenerate in every pose: only if two of its corners coincide and move
-    /// together, or all three lie on a line and move together.
+    /// Whether a triangle that is degenerate in the undeformed mesh is degenerate in every pose:
+    /// only if two of its corners coincide and move together, or all three lie on a line and move
+    /// together.
     pub(in crate::scene) fn stays_flat(&self, triangle: [u32; 3], positions: &[Vec3]) -> bool {
         let [a, b, c] = triangle.map(|i| i as usize);
-        let one = |a: usize, b: usize| a == b || (positions[a] == positions[b] && self.alike(a, b));
-        one(a, b) || one(b, c) || one(c, a) || (self.alike(a, b) && self.alike(b, c))
+        let same = |a: usize, b: usize| a == b || (positions[a] == positions[b] && self.alike(a, b));
+        same(a, b) || same(b, c) || same(c, a) || (self.alike(a, b) && self.alike(b, c))
     }
 
     /// Largest extent of the mesh, undeformed or with one morph target at weight one.
@@ -111,8 +114,8 @@ impl Deformation {
         }
     }
 
-    /// Poses `base` into `out`, whose buffers are reused. `weights`: weights of the morph targets; `joints`: joint matrices of the skin;
-    /// `tangents`: whether to pose tangents.
+    /// Poses `base` into `out`, whose buffers are reused. `weights`: weights of the morph targets;
+    /// `joints`: joint matrices of the skin; `tangents`: whether to pose tangents.
     pub(in crate::scene) fn pose(
         &self,
         base: &VertexData,
@@ -123,6 +126,8 @@ impl Deformation {
     ) {
         let active: Vec<(&MorphTarget, f64)> =
             self.targets.iter().zip(weights.iter().copied()).filter(|(_, w)| *w != 0.0).collect();
+
+        // a vertex is moved by morph targets first, then by joints
         let matrix = |v: usize| self.matrix(v, joints);
         let position = |v: usize, m: &DAffine3| {
             let moved = active.iter().filter_map(|(t, w)| Some(t.positions.get(v)?.as_dvec3() * *w));
@@ -134,6 +139,8 @@ impl Deformation {
             // a normal that targets or a collapsed joint make zero keeps its undeformed direction
             n.try_normalize().map_or(base.normals[v], |n| n.as_vec3())
         };
+
+        // positions and normals in parallel
         let count = base.positions.len();
         if base.normals.is_empty() {
             out.normals.clear();
@@ -149,6 +156,8 @@ impl Deformation {
             });
             both.unzip_into_vecs(&mut out.positions, &mut out.normals);
         }
+
+        // tangents only at rest: tracers turn them with the normals
         for (out, base) in out.tangents.iter_mut().zip(&base.tangents) {
             out.clear();
             if tangents {
@@ -191,7 +200,8 @@ impl Deformation {
 /// Minimum number of vertices per parallel task.
 const BLOCK: usize = 2048;
 
-/// The cofactor matrix, which transforms normals: the inverse transpose up to a positive factor, and defined for every `m`.
+/// The cofactor matrix, which transforms normals: the inverse transpose up to a positive factor,
+/// and defined for every `m`.
 fn cofactor(m: &DMat3) -> DMat3 {
     let c = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     if m.determinant() < 0.0 { c * -1.0 } else { c }

@@ -1,10 +1,12 @@
-//! Updates of a rig while loaders repair its scene: meshes and instances are dropped, vertices reordered.
+//! Updates of a rig while loaders repair its scene: meshes and instances are dropped, vertices
+//! reordered.
 
 use super::{AnimationRig, Deformation};
 use crate::scene::Scene;
 
 impl AnimationRig {
-    /// The deformation of each mesh, for a scene of `meshes` meshes; `None` for those that do not deform.
+    /// The deformation of each mesh, for a scene of `meshes` meshes; `None` for those that do not
+    /// deform.
     pub(in crate::scene) fn deformations_mut(&mut self, meshes: usize) -> Vec<Option<&mut Deformation>> {
         let mut all: Vec<Option<&mut Deformation>> = (0..meshes).map(|_| None).collect();
         for deformation in &mut self.parts.deformations {

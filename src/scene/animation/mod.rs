@@ -1,12 +1,14 @@
-//! Animation: a node hierarchy, skins, morph targets, and channels that change them over time, as in glTF. All of it is computed on the
-//! host, independent of tracers.
+//! Animation: a node hierarchy, skins, morph targets, and channels that change them over time, as
+//! in glTF. All of it is computed on the host, independent of tracers.
 //!
-//! [`RigParts`] is the description, [`AnimationRig`] the same after validation against a scene. A static scene
-//! has no rig. Playing goes in two steps: [`AnimationRig::motion`] declares once what an animation changes, so that tracers keep state
-//! for that only ([`super::Motion`]); [`AnimationRig::pose`] computes the state at any time.
+//! [`RigParts`] is the description, [`AnimationRig`] the same after validation against a scene. A
+//! static scene has no rig. Playing goes in two steps: [`AnimationRig::motion`] declares once what
+//! an animation changes, so that tracers keep state for that only ([`super::Motion`]);
+//! [`AnimationRig::pose`] computes the state at any time.
 //!
-//! Matrices are composed in f64 and vertices are rounded to f32 at the end. A skinned mesh lies in world space, as glTF wants it; its
-//! instance only has a translation, which is zero unless the skeleton stands far from the origin.
+//! Matrices are composed in f64 and vertices are rounded to f32 at the end. A skinned mesh lies in
+//! world space, as glTF wants it; its instance only has a translation, which is zero unless the
+//! skeleton stands far from the origin.
 
 mod check;
 mod deform;
@@ -58,7 +60,8 @@ impl LocalTransform {
         }
     }
 
-    /// The same as translation, rotation and scale; `None` for a matrix that is no product of these.
+    /// Decomposes the transform into translation, rotation and scale; `None` for a matrix that is
+    /// no product of these.
     pub(in crate::scene) fn taken_apart(&self) -> Option<Self> {
         let Self::Matrix(matrix) = *self else { return Some(*self) };
         let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
@@ -100,8 +103,8 @@ pub enum Property {
     Translation,
     /// Rotation; a quaternion x, y, z, w.
     Rotation,
-    /// Scale; three numbers. It is clamped so that the extent of an instance is at least 1e-7 of the scene's size in every direction,
-    /// because tracers invert transforms.
+    /// Scale; three numbers. It is clamped so that the extent of an instance is at least 1e-7 of
+    /// the scene's size in every direction, because tracers invert transforms.
     Scale,
     /// Weights of morph targets, as many as the node has.
     Weights,
@@ -114,7 +117,7 @@ pub struct Channel {
     pub node: usize,
     /// The animated property.
     pub property: Property,
-    /// Its values over time.
+    /// Values of the property over time, in seconds.
     pub sampler: Sampler,
 }
 
@@ -140,11 +143,13 @@ pub struct RigParts {
     pub deformations: Vec<Deformation>,
     /// Animations that can be played.
     pub animations: Vec<Animation>,
-    /// The node of each of [`Scene::instances`]; `None` for a static instance, and for skinned meshes.
+    /// The node of each of [`Scene::instances`]; `None` for a static instance, and for skinned
+    /// meshes.
     pub instances: Vec<Option<usize>>,
     /// The node of each of [`Scene::cameras`]; `None` for a static camera.
     pub cameras: Vec<Option<usize>>,
-    /// The node of each of the first of [`Scene::lights`]; `None` for a static light, as are those beyond.
+    /// The node of each of the first of [`Scene::lights`]; `None` for a static light, as are those
+    /// beyond.
     pub lights: Vec<Option<usize>>,
 }
 
@@ -163,8 +168,9 @@ pub struct AnimationRig {
 }
 
 impl AnimationRig {
-    /// Attaches a rig to a scene made in code. Deforming meshes must hold their undeformed vertices, and get those of the rest pose;
-    /// instances and cameras of nodes get the nodes' rest transforms.
+    /// Attaches a rig to a scene made in code. Deforming meshes must hold their undeformed
+    /// vertices, and get those of the rest pose; instances and cameras of nodes get the nodes' rest
+    /// transforms.
     ///
     /// # Errors
     /// [`Error::Scene`] for indices out of range, wrong counts, numbers that are not finite.
@@ -192,7 +198,7 @@ impl AnimationRig {
         Ok(Self { still: still.collect(), rest, shapes: Vec::new(), floors: Vec::new(), parts })
     }
 
-    /// Its nodes, skins, deformations and animations.
+    /// Nodes, skins, deformations and animations of the rig.
     pub fn parts(&self) -> &RigParts {
         &self.parts
     }
@@ -202,7 +208,8 @@ impl AnimationRig {
         &self.parts.animations
     }
 
-    /// A deforming undeformed mesh, before targets and skin. `deformation` is an index into [`RigParts::deformations`].
+    /// A deforming undeformed mesh, before targets and skin. `deformation` is an index into
+    /// [`RigParts::deformations`].
     pub fn undeformed(&self, deformation: usize) -> Option<&VertexData> {
         self.shapes.get(deformation)
     }
@@ -218,7 +225,8 @@ impl Channel {
         }
     }
 
-    /// Whether it keeps the node at its rest value, up to rounding. Exporters write such channels for everything that could be animated.
+    /// Whether it keeps the node at its rest value, up to rounding. Exporters write such channels
+    /// for everything that could be animated.
     pub(in crate::scene) fn is_constant(&self, node: &Node) -> bool {
         let close =
             |a: f64, b: f32| (a - f64::from(b)).abs() <= 2.0 * f64::from(f32::EPSILON) * a.abs().max(f64::from(b.abs()));

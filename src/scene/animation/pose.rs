@@ -21,7 +21,8 @@ pub enum Playback {
 }
 
 impl Playback {
-    /// Maps seconds since the start of playback to seconds in the animation. A time that is not finite maps to its beginning.
+    /// Maps seconds since the start of playback to seconds in the animation. A time that is not
+    /// finite maps to its beginning.
     pub fn time(self, seconds: f64, duration: f64) -> f64 {
         match self {
             _ if !seconds.is_finite() || duration <= 0.0 => 0.0,
@@ -36,20 +37,24 @@ impl Playback {
 pub struct PosedMesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Its vertices. Normals are empty where the mesh has none; tangents always.
+    /// Vertices of the mesh. Normals are empty where the mesh has none; tangents always.
     pub shape: VertexData,
 }
 
-/// The state at one time of everything that an animation changes. Its buffers are reused when it is filled again.
+/// The state at one time of everything that an animation changes. Its buffers are reused when it is
+/// filled again.
 #[derive(Clone, Debug, Default)]
 pub struct Pose {
-    /// Moving instances (indices into [`Scene::instances`]) and their object-to-world transforms, all of which can be inverted.
+    /// Moving instances (indices into [`Scene::instances`]) and their object-to-world transforms,
+    /// all of which can be inverted.
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that deform.
     pub meshes: Vec<PosedMesh>,
-    /// Moving cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms, without scale.
+    /// Moving cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms,
+    /// without scale.
     pub cameras: Vec<(usize, DAffine3)>,
-    /// Moving lights (indices into [`Scene::lights`]) and the transforms of their nodes to world space, without scale.
+    /// Moving lights (indices into [`Scene::lights`]) and the transforms of their nodes to world
+    /// space, without scale.
     pub lights: Vec<(usize, DAffine3)>,
     scratch: Scratch,
 }
@@ -64,11 +69,11 @@ struct Scratch {
     weights: Vec<f64>,
 }
 
-/// What deforms meshes in an animation.
+/// Joints and morph weights that deform meshes in an animation.
 struct Deforming<'a> {
     /// Whether a joint of each skin moves.
     skins: Vec<bool>,
-    /// Of nodes whose morph weights the animation has: the channel, and whether it changes them.
+    /// Channels of the nodes whose morph weights the animation has, and whether each changes them.
     weights: HashMap<usize, (&'a Channel, bool)>,
 }
 
@@ -107,8 +112,8 @@ impl Pose {
 }
 
 impl AnimationRig {
-    /// The instances that an animation moves and the meshes that it deforms. Channels that keep a node at rest do not count, nor do
-    /// cameras, which tracers do not hold.
+    /// The instances that an animation moves and the meshes that it deforms. Channels that keep a
+    /// node at rest do not count, nor do cameras, which tracers do not hold.
     ///
     /// # Errors
     /// [`Error::Usage`] when there is no such animation.
@@ -116,7 +121,7 @@ impl AnimationRig {
         let mut live = Vec::new();
         self.live(animation, &mut live)?;
         let deformations = &self.parts.deformations;
-        let deforming = self.what_deforms(animation, &live);
+        let deforming = self.find_deforming(animation, &live);
         let deform = |d: &&Deformation| deforming.deforms(d);
         Ok(Motion {
             instances: self.moved(&self.parts.instances, &live).map(|(i, _)| i).collect(),
@@ -144,8 +149,8 @@ impl AnimationRig {
         Ok(self.moved(&self.parts.lights, &live).map(|(i, _)| i).collect())
     }
 
-    /// Computes the state of everything that an animation changes ([`AnimationRig::motion`]), `seconds` after the start of playback. `pose`
-    /// is overwritten, whatever it held.
+    /// Computes the state of everything that an animation changes ([`AnimationRig::motion`]),
+    /// `seconds` after the start of playback. `pose` is overwritten, whatever it held.
     ///
     /// # Errors
     /// [`Error::Usage`] when there is no such animation.
@@ -153,6 +158,8 @@ impl AnimationRig {
         let Scratch { live, locals, world, joints, weights } = &mut pose.scratch;
         let playing = self.live(animation, live)?;
         let seconds = playback.time(seconds, playing.duration);
+
+        // local transforms at this time
         locals.clear();
         locals.extend(self.parts.nodes.iter().map(|n| n.local));
         for (channel, _) in playing.channels.iter().zip(&self.still[animation]).filter(|(_, still)| !**still) {
@@ -164,12 +171,15 @@ impl AnimationRig {
                 Property::Weights => {}
             }
         }
+
+        // world transforms, parents first
         world.clone_from(&self.rest);
         for (i, node) in self.parts.nodes.iter().enumerate().filter(|(i, _)| live[*i]) {
             let local = locals[i].affine();
             world[i] = node.parent.map_or(local, |p| world[p] * local);
         }
 
+        // what the nodes carry
         pose.instances.clear();
         let placed = self.moved(&self.parts.instances, live);
         pose.instances.extend(placed.map(|(i, node)| (i, at_least(&world[node], self.floor(i)))));
@@ -178,8 +188,9 @@ impl AnimationRig {
         pose.lights.clear();
         pose.lights.extend(self.moved(&self.parts.lights, live).map(|(i, node)| (i, rigid(&world[node]))));
 
+        // meshes that deform
         let mut count = 0;
-        let deforming = self.what_deforms(animation, live);
+        let deforming = self.find_deforming(animation, live);
         joints.resize_with(self.parts.skins.len(), Vec::new);
         joints.iter_mut().for_each(Vec::clear);
         for (d, deformation) in self.parts.deformations.iter().enumerate() {
@@ -242,8 +253,8 @@ impl AnimationRig {
         carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
     }
 
-    /// What deforms meshes in an animation that moves these nodes.
-    fn what_deforms(&self, animation: usize, live: &[bool]) -> Deforming<'_> {
+    /// Finds what deforms meshes in an animation that moves these nodes.
+    fn find_deforming(&self, animation: usize, live: &[bool]) -> Deforming<'_> {
         let skins = self.parts.skins.iter().map(|skin| skin.joints.iter().any(|&j| live[j])).collect();
         let channels = self.parts.animations[animation].channels.iter().zip(&self.still[animation]);
         let weights = channels.filter(|(c, _)| c.property == Property::Weights).map(|(c, still)| (c.node, (c, !still)));
@@ -259,7 +270,8 @@ impl AnimationRig {
         }
     }
 
-    /// The joint matrices of a mesh's skin, given the nodes' world transforms; none without a skin. Of each skin they are computed once: `known` has a place for each.
+    /// The joint matrices of a mesh's skin, given the nodes' world transforms; none without a skin.
+    /// Of each skin they are computed once: `known` has a place for each.
     fn joints<'a>(&self, deformation: &Deformation, world: &[DAffine3], known: &'a mut [Vec<DAffine3>]) -> &'a [DAffine3] {
         let Some(number) = deformation.skin else { return &[] };
         let (skin, anchor) = (&self.parts.skins[number], self.anchor(number));
@@ -282,9 +294,12 @@ impl AnimationRig {
         self.floors.get(instance).copied().unwrap_or(1e-7)
     }
 
-    /// Puts a scene whose meshes are undeformed into its rest pose, and keeps the undeformed vertices for other poses.
+    /// Puts a scene whose meshes are undeformed into its rest pose, and keeps the undeformed
+    /// vertices for other poses.
     pub(in crate::scene) fn apply_rest_pose(scene: &mut Scene) {
         let Some(mut rig) = scene.rig.take() else { return };
+
+        // the undeformed shapes are kept; the scene shows them at rest
         rig.shapes.clear();
         let (mut weights, mut joints) = (Vec::new(), vec![Vec::new(); rig.parts.skins.len()]);
         for deformation in &rig.parts.deformations {
@@ -298,6 +313,7 @@ impl AnimationRig {
             shape.give(t);
             rig.shapes.push(base);
         }
+
         // instances of meshes with skins
         let skinned = rig.parts.deformations.iter().filter_map(|d| Some((d.mesh, rig.anchor(d.skin?))));
         let places: HashMap<usize, DVec3> = skinned.collect();
@@ -306,6 +322,7 @@ impl AnimationRig {
                 instance.object_to_world = DAffine3::from_translation(*at);
             }
         }
+
         let (moving, deforming) = (rig.moving(scene), rig.deforming(scene));
         let place = |rig: &Self, scene: &mut Scene| {
             for (i, node) in rig.parts.instances.iter().enumerate().filter_map(|(i, n)| Some((i, (*n)?))) {
@@ -317,6 +334,7 @@ impl AnimationRig {
             }
         };
         place(&rig, scene);
+
         let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
         let mut extents: Vec<f64> = scene.meshes.iter().map(|m| extent(&m.geometry)).collect();
         for (deformation, base) in rig.parts.deformations.iter().zip(&rig.shapes) {
@@ -327,6 +345,8 @@ impl AnimationRig {
         let floor = |mesh: usize| Some(1e-7 * size / extents[mesh]).filter(|f| *f > 0.0 && f.is_finite()).unwrap_or(1e-7);
         rig.floors = scene.instances.iter().map(|i| floor(i.mesh)).collect();
         place(&rig, scene);
+
+        // cameras and lights
         for (camera, node) in scene.cameras.iter_mut().zip(&rig.parts.cameras) {
             if let Some(node) = *node {
                 camera.camera_to_world = rigid(&rig.rest[node]);

@@ -21,15 +21,16 @@ pub enum Interpolation {
 pub struct Sampler {
     /// Interpolation between keys.
     pub interpolation: Interpolation,
-    /// Times of the keys in seconds, in order; of two keys at one time the second counts from then on: a jump. Channels of a file often share them.
+    /// Times of the keys in seconds, in order; of two keys at one time the second counts from then
+    /// on: a jump. Channels of a file often share them.
     pub times: Arc<[f32]>,
-    /// The numbers of each key, one key after the other; for splines those of the incoming tangent, the value and the outgoing
-    /// tangent (per second).
+    /// The numbers of each key, one key after the other; for splines those of the incoming tangent,
+    /// the value and the outgoing tangent (per second).
     pub values: Vec<f32>,
 }
 
-/// The position of a time between keys: a fraction `share` (0 to 1) of the way from key `key` to the next one, which is `seconds` later (0
-/// without a next key).
+/// The position of a time between keys: a fraction `share` (0 to 1) of the way from key `key` to
+/// the next one, which is `seconds` later (0 without a next key).
 struct KeyInterval {
     key: usize,
     share: f64,
@@ -37,8 +38,9 @@ struct KeyInterval {
 }
 
 impl Sampler {
-    /// Brings the keys of a file into order: those whose time or value is not finite are removed, the others sorted by their times. Returns what there is to say about them, in
-    /// words; nothing about keys that cannot be told apart because there are not as many values as times.
+    /// Brings the keys of a file into order: those whose time or value is not finite are removed,
+    /// the others sorted by their times. Returns what there is to say about them, in words; nothing
+    /// about keys that cannot be told apart because there are not as many values as times.
     pub(in crate::scene) fn repair(&mut self, width: usize) -> Vec<String> {
         let mut said = Vec::new();
         let size = width * self.stride();
@@ -66,7 +68,8 @@ impl Sampler {
         said
     }
 
-    /// Checks that there are keys, with times that do not decrease, and a value of `width` numbers for each, all finite.
+    /// Checks that there are keys, with times that do not decrease, and a value of `width` numbers
+    /// for each, all finite.
     ///
     /// # Errors
     /// What is wrong, in words.
@@ -101,7 +104,8 @@ impl Sampler {
         self.times.last().map_or(0.0, |&t| f64::from(t))
     }
 
-    /// The numbers of key `key`, `width` of them. `part`: 0 for the value, -1 and 1 for the tangents before and after it.
+    /// The numbers of key `key`, `width` of them. `part`: 0 for the value, -1 and 1 for the
+    /// tangents before and after it.
     fn numbers(&self, key: usize, width: usize, part: isize) -> &[f32] {
         let at = match self.interpolation {
             Interpolation::CubicSpline => (3 * key).saturating_add_signed(1 + part),
@@ -214,8 +218,9 @@ mod tests {
         assert_eq!((line.end(), line.check(3), step.check(3)), (4.0, Ok(()), Ok(())));
     }
 
-    /// By hand: keys at 1 and 3 s, values 2 and 5, tangents 1 (out) and -2 (in) a second; at 1.5 s, u = 1/4:
-    /// (2/64 - 3/16 + 1) 2 + 2 (1/64 - 2/16 + 1/4) 1 + (-2/64 + 3/16) 5 + 2 (1/64 - 1/16) (-2) = 1.6875 + 0.28125 + 0.78125 + 0.1875
+    /// The value by hand: keys at 1 and 3 s, values 2 and 5, tangents 1 (out) and -2 (in) a second;
+    /// at 1.5 s, u = 1/4: (2/64 - 3/16 + 1) 2 + 2 (1/64 - 2/16 + 1/4) 1 + (-2/64 + 3/16) 5 + 2
+    /// (1/64 - 1/16) (-2) = 1.6875 + 0.28125 + 0.78125 + 0.1875
     #[test]
     fn cubic_by_hand() {
         let s = sampler(Interpolation::CubicSpline, &[1.0, 3.0], &[9.0, 2.0, 1.0, -2.0, 5.0, 9.0]);

@@ -2,15 +2,17 @@
 
 use glam::{DAffine3, DVec3};
 
-/// World position of the instance of a skinned mesh, given its first joint's world transform at rest. It is near the joint, so that the
-/// mesh keeps its precision in f32 far from the origin; it is zero for skeletons near the origin.
+/// World position of the instance of a skinned mesh, given its first joint's world transform at
+/// rest. It is near the joint, so that the mesh keeps its precision in f32 far from the origin; it
+/// is zero for skeletons near the origin.
 pub(in crate::scene) fn anchor(joint: &DAffine3) -> DVec3 {
     // so coarse that it is exact in f32
     const STEP: f64 = 1024.0;
     (joint.translation / STEP).round() * STEP
 }
 
-/// `t` with at least the scale `floor` (above zero) in every direction; unchanged where it has that.
+/// `t` with at least the scale `floor` (above zero) in every direction; unchanged where it has
+/// that.
 pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
     let mut columns = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis];
     let longest = |columns: &[DVec3; 3], of: &[usize], along: &dyn Fn(DVec3) -> DVec3| {

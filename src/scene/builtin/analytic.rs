@@ -1,5 +1,5 @@
-//! Scenes whose ambient occlusion has a closed form ([`crate::oracle::closed_form`]). Lengths are in the scene's own units,
-//! before the [`SceneTransform`].
+//! Scenes whose ambient occlusion has a closed form ([`crate::oracle::closed_form`]). Lengths are
+//! in the scene's own units, before the [`SceneTransform`].
 
 use super::shapes;
 use super::transform::SceneTransform;
@@ -31,8 +31,9 @@ pub fn closed_box(size: f64, at: SceneTransform) -> Scene {
     scene_of("closed-box", vec![("box", shapes::cuboid(-h, h))], eye, -eye, 70.0, at)
 }
 
-/// Two rectangles that meet in the z axis at `angle` radians and open upwards, mirror images in x. `length` is the extent of
-/// each along its slope, `width` along z. A point of a wall lies at `distance * (±sin(angle/2), cos(angle/2), 0)`.
+/// Two rectangles that meet in the z axis at `angle` radians and open upwards, mirror images in x.
+/// `length` is the extent of each along its slope, `width` along z. A point of a wall lies at
+/// `distance * (±sin(angle/2), cos(angle/2), 0)`.
 pub fn v_groove(angle: f64, length: f64, width: f64, at: SceneTransform) -> Scene {
     let (s, c) = (angle * 0.5).sin_cos();
     let wall = |side: f64| {
@@ -44,7 +45,8 @@ pub fn v_groove(angle: f64, length: f64, width: f64, at: SceneTransform) -> Scen
     scene_of("v-groove", parts, eye, DVec3::new(0.0, 0.45 * c * length, 0.0), 40.0, at)
 }
 
-/// An analytic sphere with its centre `height` above the middle of a horizontal square of side `side`.
+/// An analytic sphere with its centre `height` above the middle of a horizontal square of side
+/// `side`.
 pub fn sphere_over_plane(radius: f64, height: f64, side: f64, at: SceneTransform) -> Scene {
     let parts =
         vec![("plane", shapes::floor(DVec3::ZERO, side)), ("sphere", shapes::sphere(DVec3::new(0.0, height, 0.0), radius))];

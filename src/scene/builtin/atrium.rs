@@ -1,4 +1,5 @@
-//! An arcaded courtyard of two storeys, open to the sky: the kind of scene that Sponza is, of about as many triangles, and made in code.
+//! An arcaded courtyard of two storeys, open to the sky: the kind of scene that Sponza is, of about
+//! as many triangles, and made in code.
 
 use std::f64::consts::PI;
 
@@ -64,9 +65,10 @@ fn add_shell(scene: &mut Scene, plaster: usize, tile: usize) {
         let (lo, hi) = (level - SLAB * 0.6, level - 0.01);
         for (sx, sz) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
             // the slabs along z lie between those along x
-            let [a, b] = match sx == 0.0 {
-                true => [DVec3::new(-x, lo, inner_z), DVec3::new(x, hi, z)],
-                false => [DVec3::new(inner_x, lo, -inner_z), DVec3::new(x, hi, inner_z)],
+            let [a, b] = if sx == 0.0 {
+                [DVec3::new(-x, lo, inner_z), DVec3::new(x, hi, z)]
+            } else {
+                [DVec3::new(inner_x, lo, -inner_z), DVec3::new(x, hi, inner_z)]
             };
             let turn = DAffine3::from_rotation_y(if sx < 0.0 || sz < 0.0 { PI } else { 0.0 });
             scene.add_object("slab", shapes::cuboid(a, b), plaster, turn);
@@ -84,6 +86,7 @@ fn add_shell(scene: &mut Scene, plaster: usize, tile: usize) {
 fn add_arcades(scene: &mut Scene, stone: usize) {
     let baluster = scene.add_mesh("baluster", shapes::lathe(&BALUSTER, 16), stone);
     for storey in 0..2 {
+        // a storey has columns of its own height
         let (floor, ceiling) = (LEVELS[storey], LEVELS[storey + 1] - SLAB);
         let spring = floor + 0.62 * (ceiling - floor);
         let column = scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18, FLUTED), stone);
@@ -91,11 +94,14 @@ fn add_arcades(scene: &mut Scene, stone: usize) {
             let (along, across) = ((side % 2) as usize, 1 - (side % 2) as usize);
             let turn = DAffine3::from_rotation_y(f64::from(side) * PI / 2.0);
             let width = 2.0 * COURT[along] / f64::from(BAYS[along]);
+
             // the corner column is that of the side before
             for k in 1..=BAYS[along] {
                 let at = DVec3::new(f64::from(k) * width - COURT[along], floor, COURT[across]);
                 scene.add_instance("column", column, turn * DAffine3::from_translation(at));
             }
+
+            // arches between the columns, above with a balustrade
             let piece = arch(width, ceiling - spring);
             let piece = scene.add_mesh("arch", piece, stone);
             for k in 0..BAYS[along] {
@@ -111,6 +117,8 @@ fn add_arcades(scene: &mut Scene, stone: usize) {
                     }
                 }
             }
+
+            // a cornice over the arches, above with a rail
             let half = COURT[along] + THICKNESS * 0.5;
             let (z0, z1) = (COURT[across] - THICKNESS * 0.62, COURT[across] + THICKNESS * 0.5);
             let cornice = shapes::cuboid(DVec3::new(-half, ceiling, z0), DVec3::new(half, ceiling + SLAB, z1));
@@ -174,7 +182,8 @@ const POT: [[f64; 2]; 9] =
 /// Points of a column's profile around which it has grooves: the shaft without its ends.
 const FLUTED: std::ops::Range<usize> = 8..17;
 
-/// Radius and height of points of a column: base, a shaft that tapers, capital. Points 7 to 17 are the shaft.
+/// Radius and height of points of a column: base, a shaft that tapers, capital. Points 7 to 17 are
+/// the shaft.
 fn column_profile(height: f64) -> Vec<[f64; 2]> {
     let mut profile = vec![[0.36, -0.02], [0.36, 0.14], [0.33, 0.16], [0.35, 0.2], [0.35, 0.25], [0.31, 0.29], [0.28, 0.34]];
     let (bottom, top) = (0.36, height - 0.5);
@@ -193,7 +202,8 @@ fn column_profile(height: f64) -> Vec<[f64; 2]> {
     profile
 }
 
-/// A wall of the given width around x = 0 from y = 0 to `height`, with a round opening whose crown is below its top.
+/// A wall of the given width around x = 0 from y = 0 to `height`, with a round opening whose crown
+/// is below its top.
 fn arch(width: f64, height: f64) -> Geometry {
     let pier = 0.3;
     let (half, span, crown) = (width / 2.0, width / 2.0 - pier, height - 0.25);

@@ -1,8 +1,8 @@
 //! The Cornell box, after the measured data of the Cornell Program of Computer Graphics
 //! (<https://www.graphics.cornell.edu/online/box/data.html>). One unit is 100 mm.
 //!
-//! Two changes: the light hangs 0.8 mm below the ceiling, since coplanar surfaces have no defined order, and reflectances are
-//! linear RGB as renderers customarily use them.
+//! Two changes: the light hangs 0.8 mm below the ceiling, since coplanar surfaces have no defined
+//! order, and reflectances are linear RGB as renderers customarily use them.
 
 use super::shapes;
 use crate::scene::material::{MaterialKind, Transmission};
@@ -17,7 +17,8 @@ const RED: Vec3 = Vec3::new(0.63, 0.065, 0.05);
 const GREEN: Vec3 = Vec3::new(0.14, 0.45, 0.091);
 const LIGHT: Vec3 = Vec3::new(17.0, 12.0, 4.0);
 
-/// Tops of the blocks, counter-clockwise from above in x (to the left) and z (into the box), and their heights.
+/// Tops of the blocks, counter-clockwise from above in x (to the left) and z (into the box), and
+/// their heights.
 const SHORT: ([[f64; 2]; 4], f64) = ([[130.0, 65.0], [82.0, 225.0], [240.0, 272.0], [290.0, 114.0]], 165.0);
 const TALL: ([[f64; 2]; 4], f64) = ([[423.0, 247.0], [265.0, 296.0], [314.0, 456.0], [472.0, 406.0]], 330.0);
 
@@ -113,7 +114,8 @@ pub fn cornell_box() -> Scene {
     scene
 }
 
-/// The boxes of Coello (2024), open to the camera, under a white sky: (1) empty and matte; (2) matte, its tall block of metal; (3) glossy, its back wall of metal.
+/// The boxes of Coello (2024), open to the camera, under a white sky: (1) empty and matte; (2)
+/// matte, its tall block of metal; (3) glossy, its back wall of metal.
 pub fn coello(number: u32) -> Scene {
     let mut scene = walls("coello");
     scene.environment = Environment::Uniform(Vec3::ONE);

@@ -24,7 +24,8 @@ pub fn grid(n: u32) -> Scene {
     scene
 }
 
-/// `n` analytic spheres of random size and place above a floor; their density does not depend on `n`.
+/// `n` analytic spheres of random size and place above a floor; their density does not depend on
+/// `n`.
 pub fn spheres(n: u32) -> Scene {
     let mut scene = Scene { name: "spheres".to_owned(), ..Scene::default() };
     let floor = scene.add_matte("floor", Vec3::splat(0.7));
@@ -44,7 +45,8 @@ pub fn spheres(n: u32) -> Scene {
     scene
 }
 
-/// A leaf with ribs and a toothed border: alpha falls over a few texels, so that the cutoff matters.
+/// A leaf with ribs and a toothed border: alpha falls over a few texels, so that the cutoff
+/// matters.
 fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
     let mut rgba8 = Vec::with_capacity(4 * (size * size) as usize);
     for y in 0..size {
@@ -66,8 +68,8 @@ fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
     Texture { name: "leaf".to_owned(), width: size, height: size, texels: rgba8.into(), wrap: [wrap; 2], filter }
 }
 
-/// A tuft of `count` leaf cards around the origin. Its texture coordinates span `span` of the texture; with `alpha`, its
-/// vertex colours have alpha that varies.
+/// A tuft of `count` leaf cards around the origin. Its texture coordinates span `span` of the
+/// texture; with `alpha`, its vertex colours have alpha that varies.
 fn tuft(rng: &mut Rng, count: u32, span: f32, alpha: bool) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for k in 0..count {
@@ -86,16 +88,20 @@ fn tuft(rng: &mut Rng, count: u32, span: f32, alpha: bool) -> Geometry {
     Geometry::Triangles(mesh)
 }
 
-/// Bushes of leaves cut from quads: bilinear and nearest masks, wrapped and transformed texture coordinates, vertex alpha,
-/// and one blended material.
+/// Bushes of leaves cut from quads: bilinear and nearest masks, wrapped and transformed texture
+/// coordinates, vertex alpha, and one blended material.
 pub fn leaf_cards() -> Scene {
     let mut scene = Scene { name: "leaf-cards".to_owned(), ..Scene::default() };
     let floor = scene.add_matte("ground", Vec3::new(0.45, 0.38, 0.3));
     scene.add_object("ground", shapes::floor(DVec3::ZERO, 40.0), floor, DAffine3::IDENTITY);
+
+    // three textures that are wrapped and filtered in different ways
     scene.textures.push(leaf_texture(64, Wrap::Clamp, Filter::Linear));
     scene.textures.push(leaf_texture(32, Wrap::Repeat, Filter::Nearest));
     scene.textures.push(leaf_texture(48, Wrap::Mirror, Filter::Linear));
     let slot = |texture: usize, transform: Affine2| Some(TextureSlot { texture, texcoord: 0, transform });
+
+    // a material for each kind of alpha
     let mut leaf = |name: &str, tint: Vec4, base_color_texture: Option<TextureSlot>, alpha_mode: AlphaMode| {
         scene.materials.push(Material {
             name: name.to_owned(),
@@ -118,6 +124,8 @@ pub fn leaf_cards() -> Scene {
         ),
         (leaf("blended", Vec4::new(1.0, 0.8, 0.8, 0.9), slot(0, Affine2::IDENTITY), AlphaMode::Blend), 1.0, true),
     ];
+
+    // tufts of cards, ten of each kind
     let mut rng = Rng::new(0x1eaf);
     for (k, (material, span, alpha)) in kinds.into_iter().enumerate() {
         let mesh = scene.add_mesh(&format!("tuft {k}"), tuft(&mut rng, 12, span, alpha), material);
@@ -132,7 +140,8 @@ pub fn leaf_cards() -> Scene {
     scene
 }
 
-/// Stairs along a wall, a column, a rail and a few things that lie on the steps; `offset` moves everything.
+/// Stairs along a wall, a column, a rail and a few things that lie on the steps; `offset` moves
+/// everything.
 pub fn stairs(offset: DVec3) -> Scene {
     let mut scene = Scene { name: "stairs".to_owned(), ..Scene::default() };
     let stone = scene.add_matte("stone", Vec3::new(0.66, 0.64, 0.6));

@@ -1,7 +1,7 @@
 //! Built-in scenes, for tests and for a first image without any file.
 //!
-//! [`by_name`] makes the scenes by their names on the command line; [`analytic`] has those with a known ambient occlusion, with parameters for
-//! tests; [`shapes`] has their meshes.
+//! [`by_name`] makes the scenes by their names on the command line; [`analytic`] has those with a
+//! known ambient occlusion, with parameters for tests; [`shapes`] has their meshes.
 
 pub mod analytic;
 mod assemble;
@@ -26,7 +26,7 @@ use glam::{DAffine3, DVec3};
 /// Name and one-line description of a built-in scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuiltinInfo {
-    /// What [`by_name`] takes, before any `:PARAMETER`.
+    /// Name that [`by_name`] takes, before any `:PARAMETER`.
     pub name: &'static str,
     /// Contents, and the parameter with default and range, if it has one.
     pub description: &'static str,
@@ -69,8 +69,8 @@ pub fn names() -> &'static [BuiltinInfo] {
     NAMES
 }
 
-/// The built-in scene `name`, which may end in `:PARAMETER` where its description says so. `None` when there is no such scene
-/// or the parameter is out of its range.
+/// The built-in scene `name`, which may end in `:PARAMETER` where its description says so. `None`
+/// when there is no such scene or the parameter is out of its range.
 pub fn by_name(name: &str) -> Option<Scene> {
     let mut scene = recipe(name)?();
     scene.name = name.to_owned();
@@ -88,7 +88,9 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         Some((base, parameter)) => (base, Some(parameter)),
         None => (name, None),
     };
-    // a parameter that is missing takes the default; one that does not parse, or is not wanted, is an error
+
+    // a parameter that is missing takes the default; one that does not parse, or is not wanted, is
+    // an error
     let number = |default: f64, lo: f64, hi: f64| match parameter {
         None => Some(default),
         Some(p) => p.parse::<f64>().ok().filter(|v| (lo..=hi).contains(v)),
@@ -98,6 +100,8 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         Some(p) => p.parse::<u32>().ok().filter(|v| (lo..=hi).contains(v)),
     };
     let with = |make: fn(u32) -> Scene, n: Option<u32>| n.map(|n| Box::new(move || make(n)) as Box<dyn FnOnce() -> Scene>);
+
+    // scenes that take a parameter
     match base {
         "v-groove" => {
             let angle = number(90.0, 1.0, 180.0)?.to_radians();
@@ -112,6 +116,8 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         _ if parameter.is_some() => return None,
         _ => {}
     }
+
+    // scenes that take none
     let make: fn() -> Scene = match base {
         "cornell-box" => cornell::cornell_box,
         "cornell-empty" => cornell::cornell_empty,
@@ -133,8 +139,9 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     Some(Box::new(make))
 }
 
-/// The same scene with every instance's transform applied to its vertices, rounded to `f32`: what a file without transforms
-/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them). Nothing moves in it.
+/// Applies every instance's transform to its vertices, rounded to `f32`: the scene that a file
+/// without transforms would hold. Sphere meshes keep their instance's transform (it may make
+/// ellipsoids of them). Nothing moves in it.
 pub fn bake(scene: &Scene) -> Scene {
     let mut out = scene.clone();
     out.rig = None;

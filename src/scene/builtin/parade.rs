@@ -1,5 +1,5 @@
-//! An animated scene: blocks that slide and rotate, a rotor, a skinned column, a ball with morph targets, and a moving
-//! camera. It loops seamlessly after two seconds.
+//! An animated scene: blocks that slide and rotate, a rotor, a skinned column, a ball with morph
+//! targets, and a moving camera. It loops seamlessly after two seconds.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -31,6 +31,7 @@ pub fn parade() -> Scene {
     ]
     .map(|(name, color)| scene.add_matte(name, color));
 
+    // what stands still
     scene.add_object("floor", shapes::floor(DVec3::ZERO, 8.0), grey, DAffine3::IDENTITY);
     stage.parts.instances.push(None);
     let block = scene.add_mesh("block", shapes::cuboid(DVec3::splat(-0.3), DVec3::splat(0.3)), red);
@@ -60,9 +61,11 @@ pub fn parade() -> Scene {
         stage.place(&mut scene, arm, blade);
     }
 
+    // meshes that bend and swell
     stage.column(&mut scene, yellow);
     stage.ball(&mut scene, yellow);
 
+    // a fixed camera, and one on a swing
     scene.add_camera(DVec3::new(2.2, 2.6, 5.2), DVec3::new(0.0, 0.7, -0.3), 45.0);
     stage.parts.cameras.push(None);
     let swing = |t: f64| {
@@ -78,6 +81,7 @@ pub fn parade() -> Scene {
     scene.cameras.push(Camera { name: "swing".to_owned(), ..swing(0.0) });
     stage.parts.cameras.push(Some(cart));
 
+    // the second animation has the bending alone
     let bends = stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
     let animation = |name: &str, channels| Animation { name: name.to_owned(), duration: DURATION, channels };
     stage.parts.animations = vec![animation("parade", std::mem::take(&mut stage.channels)), animation("bend", bends)];
@@ -86,7 +90,7 @@ pub fn parade() -> Scene {
     scene
 }
 
-/// From 0 to 1 and back.
+/// A wave that goes from 0 to 1 and back.
 fn wave(t: f64) -> f64 {
     0.5 - 0.5 * (TAU * t / DURATION).cos()
 }

@@ -1,4 +1,5 @@
-//! Light that moves: the Cornell box, whose lamp is a ball on a rod that swings. It loops seamlessly after two seconds.
+//! Light that moves: the Cornell box, whose lamp is a ball on a rod that swings. It loops
+//! seamlessly after two seconds.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +15,8 @@ const DURATION: f64 = 2.0;
 const SWING: f64 = 0.7;
 /// Keys of the animation, the last one beginning again.
 const KEYS: u32 = 33;
-/// From the ceiling to the middle of the lamp, and the lamp's radius, scene units (of 100 mm, as in the box).
+/// Distance from the ceiling to the middle of the lamp, and the lamp's radius, scene units (of 100
+/// mm, as in the box).
 const LENGTH: f64 = 2.2;
 const RADIUS: f64 = 0.25;
 /// Radiance of the lamp: as much power as that of the box.

@@ -1,5 +1,6 @@
-//! A furnished room of as many triangles as one asks for: closed on all sides but for a window, with large walls, round shapes, thin parts and, in its
-//! bookcases, many small boxes. Rays that start on its surfaces meet something near them and nearly always something.
+//! A furnished room of as many triangles as one asks for: closed on all sides but for a window,
+//! with large walls, round shapes, thin parts and, in its bookcases, many small boxes. Rays that
+//! start on its surfaces meet something near them and nearly always something.
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
@@ -21,7 +22,8 @@ const BOARD: [f64; 2] = [0.36, 0.02];
 /// Where the bookcases stand along x, at the wall at -z.
 const CASES: [f64; 3] = [-2.7, -0.4, 1.9];
 
-/// A room of about `triangles` triangles, 10,000 at least. Round parts of furniture have more segments where there are more triangles; what is left is in books: three fifths of 40,000.
+/// A room of about `triangles` triangles, 10,000 at least. Round parts of furniture have more
+/// segments where there are more triangles; what is left is in books: three fifths of 40,000.
 pub fn room(triangles: u32) -> Scene {
     let mut scene = Scene { name: "room".to_owned(), ..Scene::default() };
     let [plaster, wood, metal, cloth, paper, leaf] = [
@@ -50,11 +52,11 @@ pub fn room(triangles: u32) -> Scene {
 }
 
 fn count(scene: &Scene) -> u32 {
-    let of = |mesh: usize| match &scene.meshes[mesh].geometry {
+    let triangles = |mesh: usize| match &scene.meshes[mesh].geometry {
         Geometry::Triangles(t) => t.indices.len() as u32,
         Geometry::Spheres(_) => 0,
     };
-    scene.instances.iter().map(|i| of(i.mesh)).sum()
+    scene.instances.iter().map(|i| triangles(i.mesh)).sum()
 }
 
 fn add_box(scene: &mut Scene, name: &str, lo: [f64; 3], hi: [f64; 3], material: usize) {
@@ -84,7 +86,8 @@ fn add_walls(scene: &mut Scene, plaster: usize, wood: usize) {
     }
 }
 
-/// Frame, bars and a half-open blind of thin slats; curtains beside it; a radiator of thin fins below.
+/// Frame, bars and a half-open blind of thin slats; curtains beside it; a radiator of thin fins
+/// below.
 fn add_window(scene: &mut Scene, metal: usize, cloth: usize, segments: u32) {
     let x = HALF[0];
     let [sill, top, half] = WINDOW;

@@ -1,4 +1,5 @@
-//! The meshes that built-in scenes are made of. Counter-clockwise seen from outside; closed shapes share their vertices.
+//! The meshes that built-in scenes are made of. Counter-clockwise seen from outside; closed shapes
+//! share their vertices.
 
 use crate::scene::{Geometry, Sphere, TriangleMesh};
 use glam::{DVec3, Vec3};
@@ -46,6 +47,7 @@ pub fn cuboid(lo: DVec3, hi: DVec3) -> Geometry {
 
 /// A sphere of `20 * 4^levels` triangles around the origin, closed, with smooth normals.
 pub fn icosphere(radius: f64, levels: u32) -> Geometry {
+    // an icosahedron from the golden ratio
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut points: Vec<DVec3> = [
         [-1.0, g, 0.0],
@@ -85,6 +87,8 @@ pub fn icosphere(radius: f64, levels: u32) -> Geometry {
         [8, 6, 7],
         [9, 8, 1],
     ];
+
+    // each level divides every triangle into four
     for _ in 0..levels {
         let mut middle_of = HashMap::new();
         let mut middle = |points: &mut Vec<DVec3>, a: u32, b: u32| {
@@ -101,6 +105,7 @@ pub fn icosphere(radius: f64, levels: u32) -> Geometry {
             })
             .collect();
     }
+
     Geometry::Triangles(TriangleMesh {
         positions: points.iter().map(|p| (*p * radius).as_vec3()).collect(),
         normals: points.iter().map(|p| p.as_vec3()).collect(),
@@ -109,18 +114,18 @@ pub fn icosphere(radius: f64, levels: u32) -> Geometry {
     })
 }
 
-/// A torus around the y axis, closed, with `2 * around * across` triangles and smooth normals.
-pub fn torus(major: f64, minor: f64, around: u32, across: u32) -> Geometry {
+/// A torus around the y axis, closed, with `2 * segments * sides` triangles and smooth normals.
+pub fn torus(major: f64, minor: f64, segments: u32, sides: u32) -> Geometry {
     let mut mesh = TriangleMesh::default();
-    for i in 0..around {
-        let (sin_a, cos_a) = (TAU * i as f64 / around as f64).sin_cos();
-        for j in 0..across {
-            let (sin_b, cos_b) = (TAU * j as f64 / across as f64).sin_cos();
+    for i in 0..segments {
+        let (sin_a, cos_a) = (TAU * i as f64 / segments as f64).sin_cos();
+        for j in 0..sides {
+            let (sin_b, cos_b) = (TAU * j as f64 / sides as f64).sin_cos();
             let normal = DVec3::new(cos_a * cos_b, sin_b, -sin_a * cos_b);
             let ring = DVec3::new(cos_a, 0.0, -sin_a) * major;
             mesh.positions.push((ring + normal * minor).as_vec3());
             mesh.normals.push(normal.as_vec3());
-            let at = |i: u32, j: u32| (i % around) * across + j % across;
+            let at = |i: u32, j: u32| (i % segments) * sides + j % sides;
             let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
             mesh.indices.extend([[a, b, c], [a, c, d]]);
         }
@@ -148,7 +153,8 @@ pub fn lathe(profile: &[[f64; 2]], segments: u32) -> Geometry {
     fluted_lathe(profile, segments, 0, 0..0)
 }
 
-/// The same with as many grooves as `flutes` around the points of the profile that `fluted` counts.
+/// A [`lathe`] with as many grooves as `flutes` around the points of the profile that `fluted`
+/// counts.
 pub fn fluted_lathe(profile: &[[f64; 2]], segments: u32, flutes: u32, fluted: Range<usize>) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for (k, [radius, y]) in profile.iter().enumerate() {
@@ -175,7 +181,8 @@ pub fn fluted_lathe(profile: &[[f64; 2]], segments: u32, flutes: u32, fluted: Ra
     Geometry::Triangles(mesh)
 }
 
-/// A curtain of folds around x = 0, hanging from y = `height` to 0; seen from both sides. It is a grid of `columns` by `rows` quads.
+/// A curtain of folds around x = 0, hanging from y = `height` to 0; seen from both sides. It is a
+/// grid of `columns` by `rows` quads.
 pub fn curtain(width: f64, height: f64, columns: u32, rows: u32) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for (k, i) in (0..=rows).flat_map(|k| (0..=columns).map(move |i| (k, i))) {

@@ -1,9 +1,11 @@
-//! Terrain of any number of triangles, for measuring how tracers scale, and many placed copies of some.
+//! Terrain of any number of triangles, for measuring how tracers scale, and many placed copies of
+//! some.
 //!
-//! Heights are fractional Brownian motion (Musgrave, Kolb and Mace, "The Synthesis and Rendering of Eroded Fractal Terrains",
-//! 1989) of gradient noise (Perlin, "Improving Noise", 2002), in integer hashes and `f64` arithmetic without library functions:
-//! the same bits on every machine. The number of triangles decides how finely the same landscape is sampled, not what it looks
-//! like, so that rays of one camera meet the same hills at every size.
+//! Heights are fractional Brownian motion (Musgrave, Kolb and Mace, "The Synthesis and Rendering of
+//! Eroded Fractal Terrains", 1989) of gradient noise (Perlin, "Improving Noise", 2002), in integer
+//! hashes and `f64` arithmetic without library functions: the same bits on every machine. The
+//! number of triangles decides how finely the same landscape is sampled, not what it looks like, so
+//! that rays of one camera meet the same hills at every size.
 
 use super::random::Rng;
 use crate::sampling::sobol::hash_combine;
@@ -17,9 +19,11 @@ const SIDE: f64 = 100.0;
 const RELIEF: f64 = 14.0;
 /// Cells of the lowest octave along a side.
 const CELLS: f64 = 5.0;
-/// The finest octave has 5 * 2^11 = 10,240 cells a side: finer than the grid of 1e7 triangles (2,236).
+/// The finest octave has 5 * 2^11 = 10,240 cells a side: finer than the grid of 1e7 triangles
+/// (2,236).
 const OCTAVES: u32 = 12;
-/// Amplitude from one octave to the next; 0.5 would be 1/f^2 noise, a little less looks like eroded hills.
+/// Amplitude from one octave to the next; 0.5 would be 1/f^2 noise, a little less looks like eroded
+/// hills.
 const GAIN: f64 = 0.47;
 
 /// One of eight gradients, by a hash of the lattice point.
@@ -53,10 +57,11 @@ fn height(seed: u32, x: f64, y: f64) -> f64 {
     sum
 }
 
-/// `n` triangles (at least 2) over a square of side [`SIDE`] around the origin, y up. Vertices are shared: 6 bytes of
-/// positions and 12 of indices a triangle.
+/// `n` triangles (at least 2) over a square of side [`SIDE`] around the origin, y up. Vertices are
+/// shared: 6 bytes of positions and 12 of indices a triangle.
 fn mesh(seed: u32, n: u32) -> Geometry {
-    // the smallest grid of two triangles a cell that has n or more; what is too many is left out of the last row
+    // the smallest grid of two triangles a cell that has n or more; what is too many is left out of
+    // the last row
     let columns = ((n as f64 / 2.0).sqrt().floor() as u32).max(1);
     let rows = n.div_ceil(2 * columns);
     let across = columns + 1;
@@ -91,8 +96,9 @@ pub fn terrain(n: u32) -> Scene {
 /// Different pieces of land in [`instances`].
 const PIECES: u32 = 15;
 
-/// `n` triangles by placing 15 landscapes, each turned, sunk and stretched differently, 125 times in total, on a
-/// quasi-random layout: about `n / 125` triangles a landscape, 25 million seen for 3 million stored.
+/// `n` triangles by placing 15 landscapes, each turned, sunk and stretched differently, 125 times
+/// in total, on a quasi-random layout: about `n / 125` triangles a landscape, 25 million seen for 3
+/// million stored.
 pub fn instances(n: u32) -> Scene {
     const PLACES: u32 = 125;
     let mut scene = Scene { name: "instances".to_owned(), ..Scene::default() };
@@ -101,7 +107,8 @@ pub fn instances(n: u32) -> Scene {
     let pieces: Vec<_> = (0..PIECES).map(|k| scene.add_mesh("land", mesh(hash_combine(0x1a4d, k), each), earth)).collect();
     let mut rng = Rng::new(0x17_57a7);
     for k in 0..PLACES {
-        // each piece shrinks to an island of about a fifth of the whole; they overlap, as scattered rocks do
+        // each piece shrinks to an island of about a fifth of the whole; they overlap, as scattered
+        // rocks do
         let at = DVec3::new(rng.range(-0.5, 0.5) * SIDE, rng.range(-3.0, 3.0), rng.range(-0.5, 0.5) * SIDE);
         let turn = DAffine3::from_rotation_y(rng.range(0.0, std::f64::consts::TAU))
             * DAffine3::from_rotation_x(rng.range(-0.25, 0.25))

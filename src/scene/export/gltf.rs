@@ -16,12 +16,15 @@ use crate::scene::{
     Camera, ClipPlanes, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
 };
 
-/// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
-/// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
+/// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin`
+/// and PNG files of the same name beside it. The extension of `path` decides. Each file appears
+/// only when it is complete, the `.gltf` last.
 ///
-/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras, punctual lights and animations with skins
-/// and morph targets survive a round trip through the loader (animated scenes are written in their rest pose). Spheres are tessellated, with a warning; what glTF cannot express (the
-/// environment, render settings, the `.brhan` kind of a material) is left out.
+/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras,
+/// punctual lights and animations with skins and morph targets survive a round trip through the
+/// loader (animated scenes are written in their rest pose). Spheres are tessellated, with a
+/// warning; what glTF cannot express (the environment, render settings, the `.brhan` kind of a
+/// material) is left out.
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.
@@ -33,6 +36,8 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
         Some("gltf") => false,
         _ => return Err(fail("glTF files end in .glb or .gltf".to_owned())),
     };
+
+    // everything in memory first: sizes come before contents in a .glb
     let mut writer = Writer { embed, ..Writer::default() };
     writer.scene(scene, path).map_err(fail)?;
     let Writer { bin, json, images, written, .. } = writer;
@@ -40,6 +45,8 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
     if u32::try_from(bin.len() + text.len() + 64).is_err() {
         return Err(fail("the scene is larger than 4 GiB, the limit of .glb".to_owned()));
     }
+
+    // one file, padded to words
     if embed {
         write_buffered(path, |out| {
             let json_size = text.len().next_multiple_of(4);
@@ -57,6 +64,8 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
         })?;
         return Ok(written);
     }
+
+    // or a file for each buffer and image
     for (name, png) in &images {
         write_buffered(&path.with_file_name(name), |out| out.write_all(png))?;
     }
@@ -67,7 +76,7 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
     Ok(written)
 }
 
-/// What files of this program say that has written them.
+/// Name of the program in the files that it writes.
 const GENERATOR: &str = concat!("skylit ", env!("CARGO_PKG_VERSION"));
 
 /// The files that [`export_gltf`] writes beside a `.gltf`; none for another extension.
@@ -125,6 +134,8 @@ impl Writer {
         let mut used = BTreeSet::new();
         let materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
         let Textures { textures, images, samplers } = self.textures(&scene.textures, path)?;
+
+        // spheres become triangles, fewer for each the more there are
         let spheres = scene.meshes.iter().map(|m| match &m.geometry {
             Geometry::Triangles(_) => 0,
             Geometry::Spheres(s) => s.len() as u64,
@@ -136,6 +147,8 @@ impl Writer {
         if spheres > 0 {
             self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
         }
+
+        // meshes, in their undeformed shape
         let rig = scene.rig.as_ref();
         let mut meshes = Vec::new();
         for (m, mesh) in scene.meshes.iter().enumerate() {
@@ -161,6 +174,8 @@ impl Writer {
             }
             meshes.push(out);
         }
+
+        // nodes, and lights on those that carry them
         let mut tree = rig::tree(scene, rig);
         let mut nodes = std::mem::take(&mut tree.nodes);
         let mut roots = std::mem::take(&mut tree.roots);
@@ -184,6 +199,8 @@ impl Writer {
             }
             lights.push(written);
         }
+
+        // cameras that no node carries have one of their own
         let diagonal = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).length());
         let nothing = ClipPlanes { near: 0.01f64.min(1e-4 * diagonal.max(1e-30)), far: 1e6f64.max(1e3 * diagonal) };
         let cameras: Vec<Value> = scene.cameras.iter().map(|c| camera(c, nothing)).collect();
@@ -196,6 +213,7 @@ impl Writer {
             Some(node)
         }));
         roots.extend(free..nodes.len());
+
         let (mut skins, mut animations) = (Vec::new(), Vec::new());
         if let Some(rig) = rig {
             skins.extend(rig.parts().skins.iter().map(|s| self.skin(s)));
@@ -220,6 +238,7 @@ impl Writer {
             }
             put("buffers", vec![buffer]);
         }
+
         put("bufferViews", std::mem::take(&mut self.views));
         put("accessors", std::mem::take(&mut self.accessors));
         put("images", images);
@@ -260,7 +279,8 @@ impl Writer {
         self.numbers(values, bounds, Some(34962))
     }
 
-    /// Appends an accessor of `N` floats an element; `target`: what its buffer view is for, if it is for vertices.
+    /// Appends an accessor of `N` floats an element; `target`: what its buffer view is for, if it
+    /// is for vertices.
     fn numbers<const N: usize>(&mut self, values: impl Iterator<Item = [f32; N]>, bounds: bool, target: Option<u32>) -> usize {
         let (mut bytes, mut count) = (Vec::new(), 0);
         let (mut min, mut max) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
@@ -301,9 +321,10 @@ impl Writer {
         let corners = mesh.indices.iter().flatten();
         // 0xffff is the primitive restart value, which glTF forbids
         let small = mesh.positions.len() <= 0xffff;
-        let bytes: Vec<u8> = match small {
-            true => corners.flat_map(|&i| (i as u16).to_le_bytes()).collect(),
-            false => corners.flat_map(|i| i.to_le_bytes()).collect(),
+        let bytes: Vec<u8> = if small {
+            corners.flat_map(|&i| (i as u16).to_le_bytes()).collect()
+        } else {
+            corners.flat_map(|i| i.to_le_bytes()).collect()
         };
         let view = self.view(&bytes, Some(34963));
         self.accessors.push(json!({
@@ -421,7 +442,8 @@ fn with_mesh(name: &str, mesh: usize, to_world: &DAffine3) -> Value {
     node
 }
 
-/// `nothing`: planes that clip next to nothing, for cameras without: glTF wants a near plane of perspective ones, and both of orthographic ones.
+/// `nothing`: planes that clip next to nothing, for cameras without: glTF wants a near plane of
+/// perspective ones, and both of orthographic ones.
 fn camera(camera: &Camera, nothing: ClipPlanes) -> Value {
     let clip = camera.clip;
     let far = if clip.far.is_finite() { clip.far } else { nothing.far };

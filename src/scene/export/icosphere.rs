@@ -7,8 +7,8 @@ use glam::Vec3;
 /// Maximum number of triangles for all spheres of a scene.
 const BUDGET: u64 = 4_000_000;
 
-/// An icosahedron whose triangles are split in four `level` times, on the unit sphere: `20 * 4^level` triangles,
-/// counter-clockwise from outside.
+/// An icosahedron whose triangles are split in four `level` times, on the unit sphere:
+/// `20 * 4^level` triangles, counter-clockwise from outside.
 pub(super) fn icosphere(level: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let phi = (1.0 + 5f32.sqrt()) * 0.5;
     let mut positions: Vec<Vec3> = [[0.0, 1.0, phi], [0.0, -1.0, phi], [0.0, 1.0, -phi], [0.0, -1.0, -phi]]
@@ -48,7 +48,8 @@ pub(super) fn icosphere(level: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// Subdivision level for a scene of `spheres` spheres: 20480 triangles each for a few, fewer for many.
+/// Subdivision level for a scene of `spheres` spheres: 20480 triangles each for a few, fewer for
+/// many.
 pub(super) fn level(spheres: u64) -> u32 {
     (1..=5).rev().find(|l| spheres.saturating_mul(20 << (2 * l)) <= BUDGET).unwrap_or(1)
 }

@@ -10,6 +10,8 @@ use crate::scene::material::{AlphaMode, Material, TextureSlot, Transmission};
 /// JSON of `material`; the extensions it takes are added to `used`.
 pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -> Value {
     let mut writer = Writer { used, extensions: Map::new() };
+
+    // what core glTF has
     let mut out = json!({
         "name": material.name,
         "doubleSided": material.double_sided,
@@ -30,6 +32,8 @@ pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -
     if material.occlusion_texture.is_some() && material.occlusion_strength != 1.0 {
         out["occlusionTexture"]["strength"] = json!(material.occlusion_strength);
     }
+
+    // alpha and emission
     match material.alpha_mode {
         AlphaMode::Opaque => {}
         AlphaMode::Mask { cutoff } => {
@@ -45,6 +49,8 @@ pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -
     if strength > 1.0 {
         writer.extension("KHR_materials_emissive_strength", json!({ "emissiveStrength": strength }));
     }
+
+    // what only extensions can say
     if !material.parameters.is_empty() {
         out["extras"] = json!(material.parameters);
     }
@@ -55,7 +61,8 @@ pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -
     out
 }
 
-/// `color` as a factor of at most 1 and a strength of at least 1, a power of two so that the product is exact.
+/// `color` as a factor of at most 1 and a strength of at least 1, a power of two so that the
+/// product is exact.
 pub(super) fn split(color: Vec3) -> (Vec3, f32) {
     let max = color.max_element();
     if !(max > 1.0 && max.is_finite()) {
@@ -148,7 +155,8 @@ impl Writer<'_> {
     }
 }
 
-/// Offset, rotation and scale of a transform without shear; the sign of the determinant goes to the second scale.
+/// Offset, rotation and scale of a transform without shear; the sign of the determinant goes to the
+/// second scale.
 fn transform(t: &Affine2) -> Value {
     let (x, y) = (t.matrix2.x_axis, t.matrix2.y_axis);
     let scale = [x.length(), y.length() * t.matrix2.determinant().signum()];

@@ -1,4 +1,5 @@
-//! MESH.bin: `u32 nv, u32 nt, f32 xyz[nv], u32 abc[nt]`, little-endian. The triangle soup that other tracers read.
+//! MESH.bin: `u32 nv, u32 nt, f32 xyz[nv], u32 abc[nt]`, little-endian. The triangle soup that
+//! other tracers read.
 
 use std::path::Path;
 
@@ -9,11 +10,12 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::scene::{Geometry, Instance, MAX_COORDINATE, Material, Mesh, Scene, TriangleMesh};
 
-/// All triangles of `scene` in the world space of its file, as single-precision positions and indices.
+/// All triangles of `scene` in the world space of its file, as single-precision positions and
+/// indices.
 ///
-/// Instances are expanded in their order, each with the vertices and the triangle order of its mesh (no corner is moved,
-/// also not under mirroring transforms), so that the n-th triangle over all instances is triangle n here. Spheres are
-/// tessellated.
+/// Instances are expanded in their order, each with the vertices and the triangle order of its mesh
+/// (no corner is moved, also not under mirroring transforms), so that the n-th triangle over all
+/// instances is triangle n here. Spheres are tessellated.
 ///
 /// # Errors
 /// [`Error::Scene`] when there are more vertices than 32-bit indices reach.
@@ -80,14 +82,16 @@ pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<ExportStats> {
     Ok(written)
 }
 
-/// Reads a MESH.bin as a scene of one flat-shaded mesh. Number and order of the triangles are those of the file:
-/// degenerate ones stay.
+/// Reads a MESH.bin as a scene of one flat-shaded mesh. Number and order of the triangles are those
+/// of the file: degenerate ones stay.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is missing, of the wrong length, or that holds positions which are not finite or
-/// indices out of range; [`Error::Scene`] when it has no triangles.
+/// [`Error::Input`] for a file that is missing, of the wrong length, or that holds positions which
+/// are not finite or indices out of range; [`Error::Scene`] when it has no triangles.
 pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     let bytes = files::read(path)?;
+
+    // a header of two numbers says the size of the file
     let words = bytes.as_chunks::<4>().0;
     let (nv, nt) = match words {
         [nv, nt, ..] => (u32::from_le_bytes(*nv), u32::from_le_bytes(*nt)),
@@ -104,9 +108,12 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     if nt == 0 {
         return Err(Error::Scene(format!("{}: the mesh has no triangles: nothing to render", path.display())));
     }
+
     let (positions, indices) = words[2..].as_chunks::<3>().0.split_at(nv as usize);
     let positions: Vec<Vec3> = positions.iter().map(|p| p.map(f32::from_le_bytes).into()).collect();
     let indices: Vec<[u32; 3]> = indices.iter().map(|t| t.map(u32::from_le_bytes)).collect();
+
+    // values that would break what comes after
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
         return Err(Error::input(path, format!("the position of vertex {i} is not finite (NaN or infinite)")));
     }
@@ -119,6 +126,8 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     if let Some(t) = indices.iter().position(|t| t.iter().any(|&i| i >= nv)) {
         return Err(Error::input(path, format!("triangle {t} refers to a vertex beyond the last, {}", nv.saturating_sub(1))));
     }
+
+    // a scene of one mesh
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let geometry = Geometry::Triangles(TriangleMesh { positions, indices, ..Default::default() });
     Ok(Scene {

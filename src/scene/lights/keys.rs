@@ -13,7 +13,7 @@ pub struct Keys<'a> {
 }
 
 impl<'a> Keys<'a> {
-    /// Those given for a kind of light; messages name the kind.
+    /// Creates the keys that are given for a kind of light; messages name the kind.
     pub fn new(kind: &'a str, given: Vec<(&'a str, &'a str)>) -> Self {
         Self { kind, given }
     }

@@ -11,18 +11,18 @@ use glam::DVec3;
 use crate::interface::LightKind as Number;
 use keys::Keys;
 
-/// What a type of light declares.
+/// Names, keys and reader that a type of light declares.
 pub struct LightType {
-    /// Its word for `--light`.
+    /// Word of the type for `--light`.
     pub word: &'static str,
-    /// Its name in inventories and messages.
+    /// Name of the type in inventories and messages.
     pub name: &'static str,
-    /// Its type in KHR_lights_punctual, if that has it. Renderers that are compared with have the
-    /// same ones.
+    /// Name of the type in KHR_lights_punctual, if that has it. Renderers that are compared with
+    /// have the same ones.
     pub gltf: Option<&'static str>,
     /// Key of its strength for `--light`, which says the unit.
     pub strength: &'static str,
-    /// Its keys for `--light`, with their units, as help lists them.
+    /// Keys of the type for `--light`, with their units, as help lists them.
     pub keys: &'static str,
     /// Takes from the keys of `--light` what the light is besides its strength and colour.
     pub read: fn(&mut Keys) -> Result<PlacedLight, String>,
@@ -42,7 +42,7 @@ pub struct PlacedLight {
 /// How a light emits. The path tracer packs and chooses lights by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Emission {
-    /// From a position.
+    /// It emits from a position.
     Placed {
         /// Angle from the axis up to which the intensity is all emitted, 0 to pi radians.
         spread: f64,
@@ -51,7 +51,7 @@ pub enum Emission {
         /// Numbers for the shader: `LightRecord.parameter_0` and `parameter_1`.
         parameters: [f32; 2],
     },
-    /// In one direction, from outside of the scene.
+    /// It emits in one direction, from outside of the scene.
     Distant {
         /// Angular diameter, 0 to pi radians.
         angle: f32,
@@ -85,10 +85,10 @@ pub enum LightKind {
 }
 
 impl LightKind {
-    /// What the types declare.
+    /// Declarations of all types.
     pub const TYPES: &'static [&'static LightType] = &[&directional::TYPE, &point::TYPE, &spot::TYPE, &led::TYPE];
 
-    /// What its type declares.
+    /// Returns the declaration of its type.
     pub fn about(self) -> &'static LightType {
         match self {
             Self::Directional { .. } => &directional::TYPE,
@@ -98,7 +98,7 @@ impl LightKind {
         }
     }
 
-    /// Its number in shaders.
+    /// Returns the number of its type in shaders.
     pub fn number(self) -> Number {
         match self {
             Self::Directional { .. } => Number::Directional,

@@ -12,9 +12,10 @@
 //! }
 //! ```
 //!
-//! Lengths are in scene units. `interpolation` is `smooth` or `linear`. `keys`, and of a key `frame`, `eye` and `target`, are
-//! required; the defaults of the others are those of the first key above. Frames increase and may be fractional. `cut` has the camera stand still at the
-//! key before, and jump to this one at its frame.
+//! Lengths are in scene units. `interpolation` is `smooth` or `linear`. `keys`, and of a key
+//! `frame`, `eye` and `target`, are required; the defaults of the others are those of the first key
+//! above. Frames increase and may be fractional. `cut` has the camera stand still at the key
+//! before, and jump to this one at its frame.
 
 use std::path::Path;
 
@@ -66,7 +67,8 @@ fn default_fov() -> f64 {
 /// Reads a camera path from JSON, in the format of the module's example.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is missing or broken, with the number of the key, counted from 1, and what is wrong with it.
+/// [`Error::Input`] for a file that is missing or broken, with the number of the key, counted from
+/// 1, and what is wrong with it.
 pub fn load_camera_path(path: &Path) -> Result<CameraPath> {
     let bytes = files::read(path)?;
     let file: PathJson =

@@ -2,11 +2,11 @@
 
 use crate::scene::TriangleMesh;
 
-/// Drops unused vertices where they are more than half. Exporters let many meshes share one large array, of which each uses
-/// a part; whole copies for each would multiply the memory.
+/// Drops unused vertices where they are more than half. Exporters let many meshes share one large
+/// array, of which each uses a part; whole copies for each would multiply the memory.
 ///
-/// A mesh that is broken (indices out of range, positions that are not finite) stays as it is, so that the error can name
-/// the file's own indices.
+/// A mesh that is broken (indices out of range, positions that are not finite) stays as it is, so
+/// that the error can name the file's own indices.
 ///
 /// Returns which vertices are left, in their order, if some were dropped.
 pub(super) fn compact(mesh: &mut TriangleMesh) -> Option<Vec<u32>> {

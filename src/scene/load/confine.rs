@@ -12,14 +12,15 @@ pub enum Confine<'a> {
     /// Any.
     #[default]
     Nowhere,
-    /// Those below the folder of the scene's file.
+    /// Files below the folder of the scene's file.
     SceneFolder,
-    /// Those below this folder.
+    /// Files below this folder.
     Folder(&'a Path),
 }
 
 impl Confine<'_> {
-    /// The folder without links that references of this scene may not leave; `None`: they may be anywhere.
+    /// The folder without links that references of this scene may not leave; `None`: they may be
+    /// anywhere.
     ///
     /// # Errors
     /// [`Error::Input`] for a folder that does not exist.
@@ -40,12 +41,14 @@ impl<'a> Confine<'a> {
     }
 }
 
-/// The path without links of what lies below `folder`, which has none either; `None` for what does not exist or lies elsewhere.
+/// The path without links of what lies below `folder`, which has none either; `None` for what does
+/// not exist or lies elsewhere.
 pub fn below(folder: &Path, path: &Path) -> Option<PathBuf> {
     fs::canonicalize(path).ok().filter(|path| path.starts_with(folder))
 }
 
-/// Whether a name that is used from the folder `from`, which lies below `folder`, leads out of it: as it is written, whether there is such a file or not, or by a link.
+/// Whether a name that is used from the folder `from`, which lies below `folder`, leads out of it:
+/// as it is written, whether there is such a file or not, or by a link.
 pub(super) fn leaves(folder: &Path, from: &Path, name: &Path) -> bool {
     if name.is_absolute() {
         return true;
@@ -66,7 +69,7 @@ pub(super) fn leaves(folder: &Path, from: &Path, name: &Path) -> bool {
     fs::canonicalize(from.join(name)).is_ok_and(|path| !path.starts_with(folder))
 }
 
-/// What is said of a reference that leads out of the folder, as the end of a sentence.
+/// Says that a reference leads out of the folder, as the end of a sentence.
 pub fn refusal(name: &str) -> String {
     let shown: String = name.chars().take(100).collect();
     format!("refers to {shown}, outside of its folder, which --confine does not allow")
@@ -79,7 +82,8 @@ pub fn refusal(name: &str) -> String {
 pub fn check(folder: &Path, owner: &Path, path: &Path) -> Result<()> {
     let refuse = || Err(Error::input(owner, refusal(&path.to_string_lossy())));
     let Some(real) = below(folder, path) else {
-        // what does not exist is an error of its own, unless asking for it tells what lies elsewhere
+        // what does not exist is an error of its own, unless asking for it tells what lies
+        // elsewhere
         let from = fs::canonicalize(folder_of(owner)).unwrap_or_default();
         let name = path.strip_prefix(folder_of(owner)).unwrap_or(path);
         return if leaves(folder, &from, name) { refuse() } else { Ok(()) };

@@ -1,4 +1,5 @@
-//! Environments from images in equirectangular projection (Radiance HDR, OpenEXR, and pictures of 8 or 16 bits), or the six faces of a cube.
+//! Environments from images in equirectangular projection (Radiance HDR, OpenEXR, and pictures of 8
+//! or 16 bits), or the six faces of a cube.
 
 mod cube;
 
@@ -19,22 +20,24 @@ use crate::scene::EnvironmentMap;
 const MAX_SIDE: u32 = 16384;
 /// Bytes of a pixel on the device and in the tables for sampling it.
 const DEVICE_BYTES: u64 = 28;
-/// Radiance that stands in for infinity: the largest value of a 16-bit float, beyond which files have infinity.
+/// Radiance that stands in for infinity: the largest value of a 16-bit float, beyond which files
+/// have infinity.
 const INFINITE_RADIANCE: f32 = 65504.0;
 
 /// Rows from the top, linear.
 struct Pixels {
     width: u32,
     height: u32,
-    /// What a map keeps, so that nothing is copied: a map of 16384x8192 has 1.6 GB.
+    /// Radiance that a map shares, so that nothing is copied: a map of 16384x8192 has 1.6 GB.
     radiance: Arc<[Vec3]>,
-    /// What was replaced, a sentence.
+    /// A sentence that says which values were replaced.
     warning: Option<String>,
 }
 
-/// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as `px`, `nx`, `py`, `ny`, `pz`, `nz`. Images are Radiance HDR, OpenEXR,
-/// PNG, JPEG or WebP, whichever their first bytes show. Colours are linear with sRGB primaries (those of PNG, JPEG and WebP are decoded); values that are negative or not a number
-/// count as 0, infinite ones as 65504.
+/// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as
+/// `px`, `nx`, `py`, `ny`, `pz`, `nz`. Images are Radiance HDR, OpenEXR, PNG, JPEG or WebP,
+/// whichever their first bytes show. Colours are linear with sRGB primaries (those of PNG, JPEG and
+/// WebP are decoded); values that are negative or not a number count as 0, infinite ones as 65504.
 ///
 /// # Errors
 /// [`Error::Input`] naming the file when it cannot be read or decoded.
@@ -119,7 +122,7 @@ impl Replaced {
         })
     }
 
-    /// What was replaced by what; nothing is said of negative values, which filters of images leave.
+    /// Says which values were replaced by which; not negative ones, which filters of images leave.
     fn text(self) -> Option<String> {
         let text = |n: usize, what: &str, value: f32| match n {
             1 => format!("1 pixel is {what} and counts as {value}"),
@@ -180,8 +183,9 @@ enum Colour<'a> {
     Grey(&'a [f32]),
 }
 
-/// The colour channels of an image: `R`, `G`, `B` or `Y`, in either case of letters, without a layer or else of the layer `Combined` (`ViewLayer.Combined.R`), or of the only
-/// layer that has colour.
+/// The colour channels of an image: `R`, `G`, `B` or `Y`, in either case of letters, without a
+/// layer or else of the layer `Combined` (`ViewLayer.Combined.R`), or of the only layer that has
+/// colour.
 ///
 /// # Errors
 /// What is missing, as the end of a sentence.
@@ -229,22 +233,22 @@ mod tests {
 
     #[test]
     fn colours_have_several_names() {
-        let of = |names: &[&str]| match colour(&image(names)) {
+        let picked = |names: &[&str]| match colour(&image(names)) {
             Ok(Colour::Rgb(planes)) => planes.iter().map(|p| p[0]).collect(),
             Ok(Colour::Grey(y)) => vec![y[0]],
             Err(_) => Vec::new(),
         };
-        assert_eq!(of(&["A", "B", "G", "R"]), [3.0, 2.0, 1.0]);
-        assert_eq!(of(&["r", "g", "b"]), [0.0, 1.0, 2.0]);
-        assert_eq!(of(&["Y"]), [0.0]);
-        assert_eq!(of(&["A", "y", "depth.Z"]), [1.0]);
-        assert_eq!(of(&["Combined.A", "Combined.B", "Combined.G", "Combined.R"]), [3.0, 2.0, 1.0]);
+        assert_eq!(picked(&["A", "B", "G", "R"]), [3.0, 2.0, 1.0]);
+        assert_eq!(picked(&["r", "g", "b"]), [0.0, 1.0, 2.0]);
+        assert_eq!(picked(&["Y"]), [0.0]);
+        assert_eq!(picked(&["A", "y", "depth.Z"]), [1.0]);
+        assert_eq!(picked(&["Combined.A", "Combined.B", "Combined.G", "Combined.R"]), [3.0, 2.0, 1.0]);
         let layers =
             ["View.Combined.B", "View.Combined.G", "View.Combined.R", "View.Diffuse.B", "View.Diffuse.G", "View.Diffuse.R"];
-        assert_eq!(of(&layers), [2.0, 1.0, 0.0]);
-        assert_eq!(of(&layers[3..]), [2.0, 1.0, 0.0]);
+        assert_eq!(picked(&layers), [2.0, 1.0, 0.0]);
+        assert_eq!(picked(&layers[3..]), [2.0, 1.0, 0.0]);
         // without a layer before all others
-        assert_eq!(of(&["B", "Combined.B", "Combined.G", "Combined.R", "G", "R"]), [5.0, 4.0, 0.0]);
+        assert_eq!(picked(&["B", "Combined.B", "Combined.G", "Combined.R", "G", "R"]), [5.0, 4.0, 0.0]);
         // two layers that have the same right, luminance without its colour, no colour
         for names in [&["a.B", "a.G", "a.R", "b.B", "b.G", "b.R"][..], &["BY", "RY", "Y"], &["A", "Z"], &["R", "G"]] {
             assert!(colour(&image(names)).is_err(), "{names:?}");
@@ -255,10 +259,10 @@ mod tests {
     fn values_that_no_map_has_are_counted() {
         let (nan, infinity) = (f32::NAN, f32::INFINITY);
         assert_eq!(Replaced::count(&[Vec3::ONE, Vec3::ZERO]), None);
-        let of = |values: &[Vec3]| Replaced::count(values).unwrap().text();
-        assert_eq!(of(&[Vec3::ONE, Vec3::NEG_ONE]), None);
-        assert_eq!(of(&[Vec3::splat(infinity)]).unwrap(), "1 pixel is infinite and counts as 65504");
-        let both = of(&[Vec3::new(infinity, nan, 1.0), Vec3::new(1.0, nan, 0.0), Vec3::splat(-infinity)]).unwrap();
+        let replaced = |values: &[Vec3]| Replaced::count(values).unwrap().text();
+        assert_eq!(replaced(&[Vec3::ONE, Vec3::NEG_ONE]), None);
+        assert_eq!(replaced(&[Vec3::splat(infinity)]).unwrap(), "1 pixel is infinite and counts as 65504");
+        let both = replaced(&[Vec3::new(infinity, nan, 1.0), Vec3::new(1.0, nan, 0.0), Vec3::splat(-infinity)]).unwrap();
         assert_eq!(both, "1 pixel is infinite and counts as 65504, 2 pixels are not a number and count as 0");
         let expected = [infinity, nan, -infinity, -1.0, 1e20].map(admissible);
         assert_eq!(expected, [65504.0, 0.0, 0.0, 0.0, 1e20]);

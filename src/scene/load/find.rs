@@ -20,7 +20,7 @@ pub(super) struct Finder {
     confine: Option<PathBuf>,
     /// The first name that leads out of it.
     refused: Option<String>,
-    /// Of each folder that was listed: its entries by their names in lower case, sorted.
+    /// Entries of each folder that was listed, by their names in lower case, sorted.
     listings: HashMap<PathBuf, HashMap<String, Vec<OsString>>>,
 }
 
@@ -53,18 +53,22 @@ impl Finder {
         own.iter().any(leaves)
     }
 
-    /// Looks for a file that is referred to as one of `names` (texts of [`text`]), by the files in `beside`. The first that
-    /// exists wins, of these:
+    /// Looks for a file that is referred to as one of `names` (texts of [`text`]), by the files in
+    /// `beside`. The first that exists wins, of these:
     ///
-    /// 1. The name as it is written, in the folders of `beside` and up to three above each, with and without a leading
-    ///    `models/`; then with backslashes as slashes, without percent-encoding, and from Latin-1.
+    /// 1. The name as it is written, in the folders of `beside` and up to three above each, with
+    ///    and without a leading `models/`; then with backslashes as slashes, without
+    ///    percent-encoding, and from Latin-1.
     /// 2. The same in another case of letters.
-    /// 3. The end of the name, `maps/t.png` of `C:\me\maps\t.png`; its last part alone beside the files only.
+    /// 3. The end of the name, `maps/t.png` of `C:\me\maps\t.png`; its last part alone beside the
+    ///    files only.
     ///
     /// # Errors
     /// The folders that were searched, each once, for the message.
     pub(super) fn find(&mut self, names: &[&str], beside: &[&Path]) -> Result<PathBuf, Vec<PathBuf>> {
         let spellings = spellings(names);
+
+        // folders beside the files, and those above them
         let (mut folders, mut own) = (Vec::new(), Vec::new());
         for file in beside {
             // absolute, because "scene.obj" has no ancestors to climb to
@@ -84,6 +88,8 @@ impl Finder {
                 }
             }
         }
+
+        // the name as it is written, with and without the folder `models`
         let mut models: Vec<PathBuf> = Vec::new();
         for spelling in spellings.iter().map(|s| text::path(s)) {
             let other = spelling.strip_prefix("models").map_or_else(|_| Path::new("models").join(&spelling), Path::to_owned);
@@ -93,11 +99,15 @@ impl Finder {
         if let Some(found) = exact.filter(|p| p.is_file()).find_map(|p| self.admit(p)) {
             return Ok(found);
         }
+
+        // the same in any case of letters
         for folder in &folders {
             if let Some(found) = models.iter().find_map(|name| self.in_any_case(folder, name)) {
                 return Ok(found);
             }
         }
+
+        // an absolute path of another machine: by its last parts
         for spelling in &spellings {
             let parts: Vec<&[u8]> = spelling.split(|b| *b == b'/').filter(|p| !p.is_empty() && *p != b".").collect();
             let longest = parts.len().saturating_sub(1).min(MAX_PARTS);
@@ -109,13 +119,15 @@ impl Finder {
                 }
             }
         }
+
         if self.is_outside(&spellings, &own) {
             self.refused.get_or_insert_with(|| names.first().copied().unwrap_or_default().to_owned());
         }
         Err(folders)
     }
 
-    /// A file below a folder, whatever the case of the letters of its name; the exact name comes first.
+    /// A file below a folder, whatever the case of the letters of its name; the exact name comes
+    /// first.
     fn in_any_case(&mut self, folder: &Path, name: &Path) -> Option<PathBuf> {
         use std::path::Component;
         let exact = folder.join(name);

@@ -1,4 +1,5 @@
-//! Checks and repairs that establish the guarantees of every loaded scene, whatever its format; [`super::load`] lists them.
+//! Checks and repairs that establish the guarantees of every loaded scene, whatever its format;
+//! [`super::load`] lists them.
 
 use std::path::Path;
 
@@ -12,7 +13,8 @@ use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::Deformation;
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
-/// Smallest extent of a scene: below it products of lengths are lost in single precision, those of drivers' triangle tests first.
+/// Smallest extent of a scene: below it products of lengths are lost in single precision, those of
+/// drivers' triangle tests first.
 const MIN_EXTENT: f64 = 1e-12;
 
 /// Largest element of an inverse transform, for the same reason.
@@ -111,13 +113,16 @@ fn host_bytes(mesh: &Mesh) -> u64 {
     }
 }
 
-/// Handles singular transforms, because tracers invert transforms. A mesh that is scaled to a plane is baked: the transform is applied to
-/// its vertices. An instance that is scaled to a line or a point, which is a way of hiding it, is dropped. Animated instances may grow
-/// again, and deforming meshes cannot be baked: both get a minimum scale instead ([`AnimationRig::apply_rest_pose`]).
+/// Handles singular transforms, because tracers invert transforms. A mesh that is scaled to a plane
+/// is baked: the transform is applied to its vertices. An instance that is scaled to a line or a
+/// point, which is a way of hiding it, is dropped. Animated instances may grow again, and deforming
+/// meshes cannot be baked: both get a minimum scale instead ([`AnimationRig::apply_rest_pose`]).
 fn bake_singular(scene: &mut Scene, budget: &Budget) {
     let before = scene.instances.len();
     let moving = scene.rig.as_ref().map(|rig| rig.moving(scene));
     let moves = |i: usize| moving.as_ref().is_some_and(|m| m[i]);
+
+    // instances that are scaled to a line or a point show nothing
     let shows = |(i, instance): (usize, &Instance)| {
         let m = &instance.object_to_world.matrix3;
         let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
@@ -131,6 +136,8 @@ fn bake_singular(scene: &mut Scene, budget: &Budget) {
     if hidden > 0 {
         scene.report.warnings.push(format!("{hidden} instances are scaled to nothing: left out"));
     }
+
+    // those that are scaled to a plane get a mesh of their own, in world space
     let deforming = scene.rig.as_ref().map(|rig| rig.deforming(scene));
     for (i, instance) in scene.instances.iter_mut().enumerate() {
         if moving.as_ref().is_some_and(|m| m[i]) || deforming.as_ref().is_some_and(|d| d[instance.mesh]) {
@@ -140,6 +147,7 @@ fn bake_singular(scene: &mut Scene, budget: &Budget) {
         if inverse.iter().all(|x| x.abs() <= MAX_INVERSE) {
             continue;
         }
+
         let source = &scene.meshes[instance.mesh];
         if budget.take(host_bytes(source), || format!("the mesh `{}`, which is scaled to a plane,", source.name)).is_err() {
             return;
@@ -175,6 +183,8 @@ struct Notes {
 fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deformation>) -> Notes {
     let mut notes = Notes::default();
     let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };
+
+    // degenerate triangles
     let before = triangles.indices.len();
     let positions = &triangles.positions;
     let opens = |t| deformation.as_ref().is_some_and(|d| !d.stays_flat(t, positions));
@@ -185,6 +195,7 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
     }
     let mut warn = |text: String| notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
 
+    // texture coordinates and colours
     for slot in material.textures() {
         let set = &mut triangles.texcoords[slot.texcoord];
         if set.is_empty() {
@@ -198,6 +209,8 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
     if bad + bad_colors > 0 {
         warn(format!("{bad} texture coordinates and {bad_colors} colours were not finite: replaced"));
     }
+
+    // normals and tangents
     if triangles.normals.is_empty() {
         notes.flat = true;
     } else {
@@ -240,7 +253,8 @@ fn drop_unplaced(scene: &mut Scene) {
     retain_meshes(scene, &keep);
 }
 
-/// Removes meshes without a triangle or sphere, and their instances: acceleration structures must not be empty.
+/// Removes meshes without a triangle or sphere, and their instances: acceleration structures must
+/// not be empty.
 fn drop_empty(scene: &mut Scene) {
     let keep: Vec<bool> = scene.meshes.iter().map(|m| m.geometry.primitive_count() > 0).collect();
     for mesh in scene.meshes.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(m, _)| m) {

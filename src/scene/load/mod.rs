@@ -1,4 +1,5 @@
-//! Loading of a [`Scene`]: a reader for each format, then `finish`, which establishes the guarantees of every scene.
+//! Loading of a [`Scene`]: a reader for each format, then `finish`, which establishes the
+//! guarantees of every scene.
 
 mod brhan;
 mod camera_path;
@@ -34,17 +35,20 @@ use options::{InProgress, Loading};
 /// Extensions of scene files.
 const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 
-/// Loads a scene: a built-in one by name (`builtin:NAME`, or `NAME` alone where no such file exists), or a file by its
-/// extension, in either case of letters: `.gltf`, `.glb`, `.obj`, `.brhan`.
+/// Loads a scene: a built-in one by name (`builtin:NAME`, or `NAME` alone where no such file
+/// exists), or a file by its extension, in either case of letters: `.gltf`, `.glb`, `.obj`,
+/// `.brhan`.
 ///
-/// A loaded scene has these guarantees: at least one instance has a triangle or sphere; at least one material exists; all
-/// indices are in range; positions, normals, texture coordinates and transforms are finite; transforms can be inverted;
-/// no triangle is degenerate, except in deforming meshes if it has an area in another pose; normals have unit length; tangents exist where a material needs them. Repairs that
-/// this took are in [`Scene::report`].
+/// A loaded scene has these guarantees: at least one instance has a triangle or sphere; at least
+/// one material exists; all indices are in range; positions, normals, texture coordinates and
+/// transforms are finite; transforms can be inverted; no triangle is degenerate, except in
+/// deforming meshes if it has an area in another pose; normals have unit length; tangents exist
+/// where a material needs them. Repairs that this took are in [`Scene::report`].
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is missing, broken or needs what skylit does not have; [`Error::Scene`] when nothing
-/// is left to render; [`Error::Usage`] for a built-in scene that does not exist.
+/// [`Error::Input`] for a file that is missing, broken or needs what skylit does not have;
+/// [`Error::Scene`] when nothing is left to render; [`Error::Usage`] for a built-in scene that does
+/// not exist.
 pub fn load(source: &str) -> Result<Scene> {
     load_with(source, &LoadOptions::default())
 }
@@ -71,7 +75,8 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
     load_file_with(path, options)
 }
 
-/// The files that a scene is read from: models, materials, buffers and images, also those that cannot be read. None of a built-in one.
+/// The files that a scene is read from: models, materials, buffers and images, also those that
+/// cannot be read. None of a built-in one.
 ///
 /// # Errors
 /// As [`load`].

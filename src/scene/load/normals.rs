@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use crate::scene::TriangleMesh;
 
-/// Brings all normals to unit length. Those that are zero or not finite become the mean of the adjacent triangles' normals,
-/// weighted by area. Returns how many those were.
+/// Brings all normals to unit length. Those that are zero or not finite become the mean of the
+/// adjacent triangles' normals, weighted by area. Returns how many those were.
 ///
 /// The mesh must have normals, and indices in range.
 pub(super) fn repair(mesh: &mut TriangleMesh) -> usize {
@@ -45,7 +45,8 @@ fn from_triangles(mesh: &mut TriangleMesh) {
     }
 }
 
-/// The geometric unit normal of each corner, with every corner made a vertex of its own: flat shading as explicit normals.
+/// The geometric unit normal of each corner, with every corner made a vertex of its own: flat
+/// shading as explicit normals.
 pub(super) fn make_flat(mesh: &mut TriangleMesh) {
     fn expand<T: Copy>(values: &mut Vec<T>, indices: &[[u32; 3]]) {
         if !values.is_empty() {

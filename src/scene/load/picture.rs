@@ -19,14 +19,16 @@ pub(super) struct DecodedImage {
     pub texels: TexelData,
 }
 
-/// Bytes of a texel of this kind, and of what it is made of: the decoder's pixel, and four channels before they are shared.
+/// Bytes of a texel of this kind, and of what it is made of: the decoder's pixel, and four channels
+/// before they are shared.
 fn texel_bytes(color: ColorType) -> [u64; 2] {
     let pixel = u64::from(color.bytes_per_pixel());
     let texel = 4 * pixel / u64::from(color.channel_count().max(1));
     [texel, pixel + texel]
 }
 
-/// Decodes an image of the format that its first bytes show or, for formats without a signature (TGA), that `name` ends in.
+/// Decodes an image of the format that its first bytes show or, for formats without a signature
+/// (TGA), that `name` ends in.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -50,16 +52,18 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
     let texels = match pixels.color() {
         ColorType::Rgb32F | ColorType::Rgba32F => {
             let mut rgba = pixels.into_rgba32f().into_raw();
-            // a texel that is not finite or negative would spoil every filtered value that includes it
+            // a texel that is not finite or negative would spoil every filtered value that includes
+            // it
             rgba.iter_mut().filter(|v| !(v.is_finite() && **v >= 0.0)).for_each(|v| *v = 0.0);
             rgba.into()
         }
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
             let rgba = pixels.into_rgba16().into_raw();
             // 8-bit values that were widened to 16 bits are stored in 8 bits again, without loss
-            match rgba.iter().all(|v| v % 257 == 0) {
-                true => rgba.iter().map(|v| (v / 257) as u8).collect::<Vec<u8>>().into(),
-                false => rgba.into(),
+            if rgba.iter().all(|v| v % 257 == 0) {
+                rgba.iter().map(|v| (v / 257) as u8).collect::<Vec<u8>>().into()
+            } else {
+                rgba.into()
             }
         }
         _ => pixels.into_rgba8().into_raw().into(),

@@ -1,12 +1,16 @@
-//! Ranges of the numbers of materials, lights and vertex colours, whatever format they come from: one table. What lies outside becomes the nearest value that is possible, and a
-//! warning says so; what is no number becomes the default. Negative light and reflection beyond 1 would go through every image that shows them.
+//! Ranges of the numbers of materials, lights and vertex colours, whatever format they come from:
+//! one table. What lies outside becomes the nearest value that is possible, and a warning says so;
+//! what is no number becomes the default. Negative light and reflection beyond 1 would go through
+//! every image that shows them.
 //!
-//! Ranges are those of glTF 2.0 and its extensions: <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#reference-material>. Emission has no upper bound there.
+//! Ranges are those of glTF 2.0 and its extensions:
+//! <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#reference-material>. Emission has no
+//! upper bound there.
 
 use crate::scene::material::{AlphaMode, Material, MaterialKind};
 use crate::scene::{Geometry, Scene};
 
-/// What lies this close to its range is rounding: nothing is said of it.
+/// Distance from its range at which a number counts as rounded: nothing is said of it.
 const ROUNDING: f32 = 1e-3;
 
 /// The least and the largest value.
@@ -20,55 +24,58 @@ const REFRACTION: Range = (1.0, f32::MAX);
 /// The numbers of a material: what they are called, their range, and where they are.
 #[rustfmt::skip]
 fn numbers(m: &mut Material) -> Vec<(&'static str, Range, &mut [f32])> {
-    let one = std::slice::from_mut::<f32>;
+    let single = std::slice::from_mut::<f32>;
     let [r, g, b, alpha] = m.base_color.as_mut();
     let mut all: Vec<(&'static str, Range, &mut [f32])> = vec![
-        ("a base colour", SHARE, one(r)),
-        ("a base colour", SHARE, one(g)),
-        ("a base colour", SHARE, one(b)),
-        ("an alpha", SHARE, one(alpha)),
-        ("a metalness", SHARE, one(&mut m.metallic)),
-        ("a roughness", SHARE, one(&mut m.roughness)),
-        ("a scale of its normal map", ANY, one(&mut m.normal_scale)),
-        ("an occlusion strength", SHARE, one(&mut m.occlusion_strength)),
+        ("a base colour", SHARE, single(r)),
+        ("a base colour", SHARE, single(g)),
+        ("a base colour", SHARE, single(b)),
+        ("an alpha", SHARE, single(alpha)),
+        ("a metalness", SHARE, single(&mut m.metallic)),
+        ("a roughness", SHARE, single(&mut m.roughness)),
+        ("a scale of its normal map", ANY, single(&mut m.normal_scale)),
+        ("an occlusion strength", SHARE, single(&mut m.occlusion_strength)),
         ("an emission", AMOUNT, m.emissive.as_mut()),
         ("a specular colour", SHARE, m.specular_color.as_mut()),
         ("a transmitted colour", SHARE, m.transmittance.as_mut()),
-        ("a clearcoat", SHARE, one(&mut m.clearcoat.factor)),
-        ("a clearcoat roughness", SHARE, one(&mut m.clearcoat.roughness)),
-        ("a scale of its clearcoat's normal map", ANY, one(&mut m.clearcoat.normal_scale)),
+        ("a clearcoat", SHARE, single(&mut m.clearcoat.factor)),
+        ("a clearcoat roughness", SHARE, single(&mut m.clearcoat.roughness)),
+        ("a scale of its clearcoat's normal map", ANY, single(&mut m.clearcoat.normal_scale)),
         ("a sheen colour", SHARE, m.sheen.color.as_mut()),
-        ("a sheen roughness", SHARE, one(&mut m.sheen.roughness)),
-        ("a transmission", SHARE, one(&mut m.transmission.factor)),
-        ("a thickness", AMOUNT, one(&mut m.transmission.thickness)),
+        ("a sheen roughness", SHARE, single(&mut m.sheen.roughness)),
+        ("a transmission", SHARE, single(&mut m.transmission.factor)),
+        ("a thickness", AMOUNT, single(&mut m.transmission.thickness)),
         ("an attenuation colour", SHARE, m.transmission.attenuation_color.as_mut()),
-        ("a specular factor", SHARE, one(&mut m.specular.factor)),
+        ("a specular factor", SHARE, single(&mut m.specular.factor)),
         // it may raise the reflectance of a low index of refraction to 1
         ("a specular colour factor", AMOUNT, m.specular.color.as_mut()),
-        ("an anisotropy", SHARE, one(&mut m.anisotropy.strength)),
-        ("an anisotropy rotation", ANY, one(&mut m.anisotropy.rotation)),
+        ("an anisotropy", SHARE, single(&mut m.anisotropy.strength)),
+        ("an anisotropy rotation", ANY, single(&mut m.anisotropy.rotation)),
     ];
     // 0 is glTF's word for a Fresnel term of 1
     if m.ior != 0.0 || m.kind != MaterialKind::MetallicRoughness {
-        all.push(("an index of refraction", REFRACTION, one(&mut m.ior)));
+        all.push(("an index of refraction", REFRACTION, single(&mut m.ior)));
     }
     if let AlphaMode::Mask { cutoff } = &mut m.alpha_mode {
-        all.push(("an alpha cutoff", AMOUNT, one(cutoff)));
+        all.push(("an alpha cutoff", AMOUNT, single(cutoff)));
     }
-    all.extend(m.mtl_dissolve.as_mut().map(|d| ("a `d`", SHARE, one(d))));
-    all.extend(m.parameters.iter_mut().map(|(_, value)| ("an extra", ANY, one(value))));
+    all.extend(m.mtl_dissolve.as_mut().map(|d| ("a `d`", SHARE, single(d))));
+    all.extend(m.parameters.iter_mut().map(|(_, value)| ("an extra", ANY, single(value))));
     all
 }
 
 /// Brings the numbers of materials, lights and vertex colours into their ranges.
 pub(super) fn apply(scene: &mut Scene) {
     let mut warnings = Vec::new();
+
     // an infinite distance attenuates nothing
     for transmission in scene.materials.iter_mut().map(|m| &mut m.transmission) {
         if transmission.attenuation_distance.is_nan() || transmission.attenuation_distance <= 0.0 {
             transmission.attenuation_distance = f32::INFINITY;
         }
     }
+
+    // numbers of materials, each with the default that stands in for it
     for material in &mut scene.materials {
         let name = material.name.clone();
         let mut defaults = Material { kind: material.kind, ..Material::default() };
@@ -88,6 +95,8 @@ pub(super) fn apply(scene: &mut Scene) {
             }
         }
     }
+
+    // lights and colours of vertices
     for light in &mut scene.lights {
         if let Some(text) = bring_into(AMOUNT, light.intensity.as_mut(), &[0.0; 3]) {
             warnings.push(format!("light `{}` has an intensity of {text}", light.name));

@@ -8,7 +8,8 @@ use glam::{Affine2, Vec2, Vec3, Vec4};
 use super::normals;
 use crate::scene::{Material, TextureSlot, TriangleMesh};
 
-/// Brings the file's tangents to unit length with a handedness of -1 or 1. False when there are none, or unusable ones.
+/// Brings the file's tangents to unit length with a handedness of -1 or 1. False when there are
+/// none, or unusable ones.
 pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
     for t in &mut mesh.tangents {
         let Some(direction) = t.truncate().as_dvec3().try_normalize() else { return false };
@@ -20,8 +21,9 @@ pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
     !mesh.tangents.is_empty() && !mesh.normals.is_empty()
 }
 
-/// Textures whose values are directions, in the order of [`TriangleMesh`]'s tangents: the one that the mesh's tangents are those of, and that of the clearcoat and that of anisotropy
-/// where they lie differently.
+/// Textures whose values are directions, in the order of [`TriangleMesh`]'s tangents: the one that
+/// the mesh's tangents are those of, and that of the clearcoat and that of anisotropy where they
+/// lie differently.
 fn textures(material: &Material) -> (Option<TextureSlot>, [Option<TextureSlot>; 2]) {
     let clearcoat = material.clearcoat.normal_texture.filter(|_| material.clearcoat.factor > 0.0);
     let anisotropy = material.anisotropy.texture.filter(|_| material.anisotropy.strength > 0.0);
@@ -30,7 +32,8 @@ fn textures(material: &Material) -> (Option<TextureSlot>, [Option<TextureSlot>; 
     (first, [clearcoat, anisotropy].map(|slot| slot.filter(|s| first.is_some_and(|f| !lie_alike(&f, s)))))
 }
 
-/// Whether the tangents of two textures are the same: their coordinates differ by scales of u and v above zero, and by where they begin.
+/// Whether the tangents of two textures are the same: their coordinates differ by scales of u and v
+/// above zero, and by where they begin.
 fn lie_alike(a: &TextureSlot, b: &TextureSlot) -> bool {
     let between = b.transform.matrix2 * a.transform.matrix2.inverse();
     let (x, y) = (between.x_axis, between.y_axis);
@@ -38,12 +41,14 @@ fn lie_alike(a: &TextureSlot, b: &TextureSlot) -> bool {
     a.texcoord == b.texcoord && (is_scale || a.transform.matrix2 == b.transform.matrix2)
 }
 
-/// Computes tangents for the textures of a material ([`corner_tangents`]). Vertices whose triangles disagree are split; a mesh without normals becomes explicitly flat. Returns which
-/// vertex each vertex was before.
+/// Computes tangents for the textures of a material ([`corner_tangents`]). Vertices whose triangles
+/// disagree are split; a mesh without normals becomes explicitly flat. Returns which vertex each
+/// vertex was before.
 pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> {
-    let mut source: Vec<u32> = match mesh.normals.is_empty() {
-        true => mesh.indices.iter().flatten().copied().collect(),
-        false => (0..mesh.positions.len() as u32).collect(),
+    let mut source: Vec<u32> = if mesh.normals.is_empty() {
+        mesh.indices.iter().flatten().copied().collect()
+    } else {
+        (0..mesh.positions.len() as u32).collect()
     };
     if mesh.normals.is_empty() {
         normals::make_flat(mesh);
@@ -57,8 +62,10 @@ pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> 
     source
 }
 
-/// The tangent at each corner of each triangle, from the texture coordinates of a texture, transformed as the texture's are: what a map says about right and up is of its own image.
-/// Where these are the same everywhere, or there is no texture, from the first set that is not. Where none has a gradient, tangents are [`horizontal`].
+/// The tangent at each corner of each triangle, from the texture coordinates of a texture,
+/// transformed as the texture's are: what a map says about right and up is of its own image. Where
+/// these are the same everywhere, or there is no texture, from the first set that is not. Where
+/// none has a gradient, tangents are [`horizontal`].
 fn corner_tangents(mesh: &TriangleMesh, texture: Option<TextureSlot>) -> Vec<Vec4> {
     let own = texture.map(|t| (t.texcoord, t.transform)).filter(|(_, transform)| transform.matrix2.determinant() != 0.0);
     let candidates = own.into_iter().chain([0, 1].map(|set| (set, Affine2::IDENTITY)));
@@ -90,7 +97,8 @@ pub(super) fn varies(texcoords: &[Vec2]) -> bool {
     texcoords.windows(2).any(|w| w[0] != w[1])
 }
 
-/// The tangent of a surface without texture coordinates: around the y axis of the mesh, as the lines of latitude of a globe run; along x at the poles.
+/// The tangent of a surface without texture coordinates: around the y axis of the mesh, as the
+/// lines of latitude of a globe run; along x at the poles.
 fn horizontal(normal: Vec3) -> Vec4 {
     let t = Vec3::new(normal.z, 0.0, -normal.x);
     if t.length_squared() > 1e-6 { t.normalize().extend(1.0) } else { Vec4::new(1.0, 0.0, 0.0, 1.0) }
@@ -105,7 +113,8 @@ fn first(group: &mut [usize], mut member: usize) -> usize {
     member
 }
 
-/// Most triangles around a vertex that MikkTSpace is asked about: it takes the square of their number, and recurses as deep.
+/// Most triangles around a vertex that MikkTSpace is asked about: it takes the square of their
+/// number, and recurses as deep.
 const MAX_AROUND: u32 = 1024;
 
 struct Corners<'a> {
@@ -134,26 +143,27 @@ impl Corners<'_> {
         [uv.x + 0.0, 1.0 - uv.y]
     }
 
-    /// What makes vertices one: bits of position, normal and texture coordinates.
+    /// Key by which vertices are one: bits of position, normal and texture coordinates.
     fn key(&self, vertex: usize) -> [u32; 8] {
         let ([x, y, z], [nx, ny, nz]) = (self.mesh.positions[vertex].to_array(), self.mesh.normals[vertex].to_array());
         let [u, v] = self.texcoord(vertex);
         [x, y, z, nx, ny, nz, u, v].map(|value| (value + 0.0).to_bits())
     }
 
-    /// For each triangle, whether it is at a vertex with more than [`MAX_AROUND`]; `None` if none is.
+    /// For each triangle, whether it is at a vertex with more than [`MAX_AROUND`]; `None` if none
+    /// is.
     fn crowded(&self) -> Option<Vec<bool>> {
         let indices = &self.mesh.indices;
         if indices.len() <= MAX_AROUND as usize {
             return None;
         }
-        let mut around = vec![0_u32; self.mesh.positions.len()];
-        indices.iter().flatten().for_each(|&v| around[v as usize] += 1);
+        let mut triangles_at = vec![0_u32; self.mesh.positions.len()];
+        indices.iter().flatten().for_each(|&v| triangles_at[v as usize] += 1);
 
         // vertices by a hash first: hardly a mesh has so many triangles with one
         let slots = self.mesh.positions.len().next_power_of_two();
         let mut counts = vec![0_u32; slots];
-        for (vertex, &count) in around.iter().enumerate().filter(|(_, count)| **count > 0) {
+        for (vertex, &count) in triangles_at.iter().enumerate().filter(|(_, count)| **count > 0) {
             let mix = |hash: u64, bits: u32| (hash ^ u64::from(bits)).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(23);
             let hash = self.key(vertex).into_iter().fold(0, mix);
             counts[hash as usize & (slots - 1)] += count;
@@ -164,7 +174,7 @@ impl Corners<'_> {
 
         // then by what they are
         let mut exact: HashMap<[u32; 8], u32> = HashMap::new();
-        for (vertex, count) in around.iter().enumerate() {
+        for (vertex, count) in triangles_at.iter().enumerate() {
             *exact.entry(self.key(vertex)).or_default() += count;
         }
         let is_crowded = |v: u32| exact[&self.key(v as usize)] > MAX_AROUND;
@@ -172,8 +182,9 @@ impl Corners<'_> {
         crowded.contains(&true).then_some(crowded)
     }
 
-    /// Leaves triangles at crowded vertices out, and gives their corners the mean of the tangents of the triangles around the vertex that share edges with each other, weighted by
-    /// angle: that is MikkTSpace's, where an edge has two triangles.
+    /// Leaves triangles at crowded vertices out, and gives their corners the mean of the tangents
+    /// of the triangles around the vertex that share edges with each other, weighted by angle: that
+    /// is MikkTSpace's, where an edge has two triangles.
     fn set_crowded_apart(&mut self) {
         let Some(crowded) = self.crowded() else { return };
         let apart: Vec<usize> = (0..crowded.len()).filter(|&t| crowded[t]).collect();
@@ -266,9 +277,11 @@ type Tangents = [Vec4; 3];
 
 /// Tangents that differ by no more than this are the same.
 const TOLERANCE: f32 = 1e-5;
-/// Side of the cells that tangents are sorted into: a component and all that are the same lie in two cells at most.
+/// Side of the cells that tangents are sorted into: a component and all that are the same lie in
+/// two cells at most.
 const CELL: f64 = 2.5e-5;
-/// Copies of a vertex that are compared one after another. Of those that have more, cells are looked into.
+/// Copies of a vertex that are compared one after another. Of those that have more, cells are
+/// looked into.
 const MAX_CHAIN: usize = 16;
 
 fn differ(a: &Tangents, b: &Tangents) -> bool {
@@ -293,7 +306,7 @@ struct Copies {
     taken: Vec<bool>,
     /// Another copy of the vertex that a vertex copies, or itself.
     next: Vec<u32>,
-    /// Of vertices with many copies: the copies by the cells of their tangents.
+    /// Copies of vertices that have many of them, by the cells of their tangents.
     sorted: HashMap<(u32, [i32; 12]), Vec<u32>>,
     /// The last copy of each of these vertices.
     last: HashMap<u32, u32>,
@@ -322,7 +335,8 @@ impl Copies {
         !differ(&self.tangents[vertex as usize], tangents)
     }
 
-    /// The copy of a vertex, or the vertex, with these tangents: the first of several. `true`: it is a new copy.
+    /// The copy of a vertex, or the vertex, with these tangents: the first of several. `true`: it
+    /// is a new copy.
     fn find(&mut self, vertex: u32, tangents: Tangents) -> (u32, bool) {
         if !self.taken[vertex as usize] {
             (self.taken[vertex as usize], self.tangents[vertex as usize]) = (true, tangents);
@@ -402,8 +416,8 @@ impl Copies {
     }
 }
 
-/// Gives each vertex the tangents of its corners (three per triangle, for each array that is not empty), with a copy of the vertex for each other tangents.
-/// Returns what each copy is one of.
+/// Gives each vertex the tangents of its corners (three per triangle, for each array that is not
+/// empty), with a copy of the vertex for each other tangents. Returns what each copy is one of.
 fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
     let at = |corner: usize| corners.map(|c| c.get(corner).copied().unwrap_or_default());
     let mut vertices = Copies::new(mesh.positions.len());
@@ -433,10 +447,7 @@ fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
     for ((tangents, normal), _) in tangents.iter_mut().zip(&mesh.normals).zip(&taken).filter(|(_, taken)| !**taken) {
         *tangents = [horizontal(*normal); 3];
     }
-    let array = |k: usize| match corners[k].is_empty() {
-        true => Vec::new(),
-        false => tangents.iter().map(|t| t[k]).collect(),
-    };
+    let array = |k: usize| if corners[k].is_empty() { Vec::new() } else { tangents.iter().map(|t| t[k]).collect() };
     (mesh.tangents, mesh.clearcoat_tangents, mesh.anisotropy_tangents) = (array(0), array(1), array(2));
     copies
 }
@@ -481,7 +492,8 @@ mod tests {
         }
     }
 
-    /// Every corner at one vertex has tangents of its own: comparisons grow with their number, not with its square.
+    /// Every corner at one vertex has tangents of its own: comparisons grow with their number, not
+    /// with its square.
     #[test]
     fn many_copies_of_a_vertex_cost_little_each() {
         const CORNERS: u32 = 60_000;
@@ -509,7 +521,8 @@ mod tests {
         mesh
     }
 
-    /// Around a vertex with too many triangles tangents are what MikkTSpace has around one with fewer.
+    /// Around a vertex with too many triangles tangents are what MikkTSpace has around one with
+    /// fewer.
     #[test]
     fn crowded_vertices_have_the_same_tangents() {
         for flip in [1.0, -1.0] {
@@ -523,7 +536,8 @@ mod tests {
         assert!(corner_tangents(&disk(100_000, 1.0), None).iter().all(|t| t.is_finite()));
     }
 
-    /// A fan of triangles that share a vertex and nothing else, each with a texture that lies another way.
+    /// A fan of triangles that share a vertex and nothing else, each with a texture that lies
+    /// another way.
     #[test]
     fn a_fan_of_many_triangles() {
         let count = 60_000;

@@ -1,8 +1,9 @@
-//! Text files as others write them: with byte order marks, in UTF-16, with any line end, and with names in encodings that
-//! nobody knows.
+//! Text files as others write them: with byte order marks, in UTF-16, with any line end, and with
+//! names in encodings that nobody knows.
 //!
-//! A name is its bytes: two that differ in a byte that is no UTF-8 are two names. So such a byte becomes a character of a
-//! private plane ([`from_bytes`]), which [`bytes_of`] turns back and [`shown`] makes readable.
+//! A name is its bytes: two that differ in a byte that is no UTF-8 are two names. So such a byte
+//! becomes a character of a private plane ([`from_bytes`]), which [`bytes_of`] turns back and
+//! [`shown`] makes readable.
 
 use std::borrow::Cow;
 use std::io::{Cursor, Read};
@@ -52,8 +53,8 @@ pub(super) fn bytes_of(text: &str) -> Cow<'_, [u8]> {
     Cow::Owned(bytes)
 }
 
-/// The text for people: what is no UTF-8 is read as Latin-1, the likeliest of all encodings, and its control characters
-/// are written as numbers.
+/// The text for people: what is no UTF-8 is read as Latin-1, the likeliest of all encodings, and
+/// its control characters are written as numbers.
 pub(super) fn shown(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -86,8 +87,9 @@ enum Encoding {
     Bytes,
 }
 
-/// The encoding of a file that begins with these bytes, and the length of its byte order mark. What we read begins with a
-/// word of ASCII, so a zero beside the first character is the other half of UTF-16 without a mark.
+/// The encoding of a file that begins with these bytes, and the length of its byte order mark. What
+/// we read begins with a word of ASCII, so a zero beside the first character is the other half of
+/// UTF-16 without a mark.
 fn encoding(start: &[u8]) -> (Encoding, usize) {
     match start {
         [0xef, 0xbb, 0xbf, ..] => (Encoding::Bytes, 3),
@@ -128,13 +130,15 @@ pub(super) fn trim(text: &str) -> &str {
     text.trim_matches(|c: char| c.is_ascii_whitespace() || c == '\0')
 }
 
-/// What stands before ` #`: names may hold a `#`, so only one after white space begins a comment.
+/// Returns the text before ` #`: names may hold a `#`, so only one after white space begins a
+/// comment.
 pub(super) fn without_comment(text: &str) -> &str {
     let end = text.char_indices().zip(text.chars().skip(1)).find(|((_, a), b)| a.is_ascii_whitespace() && *b == '#');
     trim(end.map_or(text, |((i, _), _)| &text[..i]))
 }
 
-/// A name and what is left of it where comments are cut off: it may hold ` #` itself, so the longest comes first.
+/// A name and what is left of it where comments are cut off: it may hold ` #` itself, so the
+/// longest comes first.
 pub(super) fn uncommented(text: &str) -> impl Iterator<Item = &str> {
     /// More parts than a name has.
     const MAX_CUTS: usize = 4;
@@ -144,7 +148,7 @@ pub(super) fn uncommented(text: &str) -> impl Iterator<Item = &str> {
     std::iter::once(text).chain(cuts)
 }
 
-/// What stands in quotation marks, if all of it does.
+/// Takes quotation marks off, if all of the text stands in them.
 pub(super) fn unquoted(text: &str) -> &str {
     let text = trim(text);
     let inner = |mark: char| text.strip_prefix(mark).and_then(|t| t.strip_suffix(mark));
@@ -247,8 +251,8 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// Whether a backslash at the end of a line joins the next one to it. In a comment it is the end of a path, and after a
-/// byte that is no UTF-8 the second half of a character of GBK or Shift JIS.
+/// Whether a backslash at the end of a line joins the next one to it. In a comment it is the end of
+/// a path, and after a byte that is no UTF-8 the second half of a character of GBK or Shift JIS.
 fn is_continued(line: &[u8]) -> bool {
     let line = line.trim_ascii_end();
     let [.., before, b'\\'] = line else { return line == b"\\" };

@@ -8,8 +8,8 @@ const LISTED: usize = 4;
 /// Longest warning, in characters: names in files may be of any length.
 const MAX_LENGTH: usize = 1000;
 
-/// Warnings with those of one kind summed up: the first, and how many more there are. A kind is a text without what it
-/// quotes and counts.
+/// Warnings with those of one kind summed up: the first, and how many more there are. A kind is a
+/// text without what it quotes and counts.
 pub(super) fn bounded(warnings: Vec<String>) -> Vec<String> {
     let mut counts: HashMap<String, usize> = HashMap::new();
     for warning in &warnings {

@@ -89,6 +89,8 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
         Dialog::Render(..) => ("Render this view", "A file: .png, .exr, .jpg, .webp, .apng or frames.####.png", "Render"),
     };
+
+    // its window: a path, and the action as a button
     let (mut open, mut done, mut browses, before) = (true, false, false, app.dialog.clone());
     egui::Window::new(title)
         .open(&mut open)
@@ -110,10 +112,13 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
                 }
             });
         });
+
+    // the system's dialog runs beside; its answer comes later
     if browses {
         let context = context.clone();
         app.browsing = Some(Browsing::start(dialog.clone(), move || context.request_repaint()));
     }
+
     if !open {
         app.dialog = None;
     } else if done {

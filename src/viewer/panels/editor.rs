@@ -1,4 +1,5 @@
-//! Editors of settings, made from the settings themselves: names, help and values are those of the command line.
+//! Editors of settings, made from the settings themselves: names, help and values are those of the
+//! command line.
 
 use egui::{ComboBox, DragValue, Response, Ui};
 
@@ -25,14 +26,16 @@ fn help(setting: &Setting) -> String {
     format!("{}\n--{}", setting.help, setting.name.replace('_', "-"))
 }
 
-/// Shows settings, a line each. `effective`: the values that hold where none is given, by name. Settings without an editor are left out. Returns true if one was
-/// changed.
+/// Shows settings, a line each. `effective`: the values that hold where none is given, by name.
+/// Settings without an editor are left out. Returns true if one was changed.
 pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) -> bool {
     let mut changed = false;
     for mut setting in settings {
         if matches!(setting.value, Value::Other) {
             continue;
         }
+
+        // a flag is a tick alone
         let default = effective.get(setting.name);
         let (is_given, help) = (setting.is_given(), help(&setting));
         ui.horizontal(|ui| {
@@ -40,6 +43,8 @@ pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) 
                 changed |= ui.checkbox(flag, title(setting.name)).on_hover_text(&help).changed();
                 return;
             }
+
+            // the others are a label, a value, and a way back to the default
             let label = ui.label(title(setting.name)).on_hover_text(&help);
             let name = setting.name;
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -53,6 +58,8 @@ pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) 
                     changed = true;
                     return;
                 }
+
+                // the value's control
                 let response = match &mut setting.value {
                     Value::Count(count) => number(ui, name, count, default, 0.2, 0..=u32::MAX),
                     Value::Number(value) => number(ui, name, value, default, 0.01, f64::NEG_INFINITY..=f64::INFINITY),
@@ -90,7 +97,8 @@ fn is_accepted(name: &str, value: f64) -> bool {
     !outcome.is_err_and(|e| matches!(e.kind(), ErrorKind::ValueValidation | ErrorKind::InvalidValue))
 }
 
-/// A number that is dragged or typed; changing it gives it, from the default on, unless the command line would refuse it.
+/// A number that is dragged or typed; changing it gives it, from the default on, unless the command
+/// line would refuse it.
 fn number<T: egui::emath::Numeric>(
     ui: &mut Ui,
     name: &str,

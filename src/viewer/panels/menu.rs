@@ -56,6 +56,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
 }
 
 fn file(app: &mut App, ui: &mut Ui) {
+    // scenes
     if item(ui, "Open…", Some(&shortcuts::OPEN), "") {
         app.dialog = Some(Dialog::Open(String::new()));
     }
@@ -83,6 +84,8 @@ fn file(app: &mut App, ui: &mut Ui) {
         app.reload();
     }
     ui.separator();
+
+    // images of this view
     if item(ui, "Save image…", Some(&shortcuts::SAVE), "") {
         app.dialog = Some(Dialog::Save(format!("{}.png", stem(app))));
     }
@@ -103,6 +106,8 @@ fn file(app: &mut App, ui: &mut Ui) {
         copy_command(app);
     }
     ui.separator();
+
+    // settings
     if item(ui, "Load settings…", None, "") {
         app.dialog = Some(Dialog::LoadSettings("settings.json".into()));
     }
@@ -237,7 +242,8 @@ pub fn play(app: &mut App) {
     }
 }
 
-/// Moves the camera to where it sees the whole scene from outside; to another place if that shows nothing.
+/// Moves the camera to where it sees the whole scene from outside; to another place if that shows
+/// nothing.
 pub fn frame_all(app: &mut App) {
     let [width, height] = app.size();
     if let Some(scene) = &app.scene {

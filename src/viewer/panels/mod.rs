@@ -10,7 +10,8 @@ mod viewport;
 
 use super::app::App;
 
-/// Runs a frame of the user interface: takes over what has happened, shows everything, requests what has changed.
+/// Runs a frame of the user interface: takes over what has happened, shows everything, requests
+/// what has changed.
 pub fn show_frame(app: &mut App, context: &egui::Context) {
     app.begin_frame(context);
     show(app, context);

@@ -12,7 +12,9 @@ pub fn show(app: &App, ui: &mut Ui) {
         ui.label("no frame yet");
         return;
     }
-    // the labels of passes are those of pipelines' steps: "ao_trace generate"; a pass is its first word
+
+    // the labels of passes are those of pipelines' steps: "ao_trace generate"; a pass is its first
+    // word
     let pass = |label: &'static str| label.split(' ').next().unwrap_or(label);
     let mut passes: Vec<&str> = Vec::new();
     for timing in app.frames.iter().flat_map(|f| &f.step.timings) {
@@ -20,6 +22,8 @@ pub fn show(app: &App, ui: &mut Ui) {
             passes.push(pass(timing.label));
         }
     }
+
+    // the time of each pass in each frame, stacked
     let mut charts: Vec<BarChart> = Vec::new();
     let mut rows = Vec::new();
     for name in passes {
@@ -33,6 +37,8 @@ pub fn show(app: &App, ui: &mut Ui) {
         let ran: Vec<f64> = ms.iter().copied().filter(|v| *v > 0.0).collect();
         rows.push((name, median(&ran).unwrap_or(0.0), percentile(&ran, 0.95).unwrap_or(0.0)));
     }
+
+    // the chart, and a table of the same passes
     Plot::new("device time")
         .height(140.0)
         .legend(Legend::default())
@@ -55,6 +61,8 @@ pub fn show(app: &App, ui: &mut Ui) {
             ui.end_row();
         }
     });
+
+    // totals
     let mib = app.device.bytes as f64 / f64::from(1 << 20);
     if let Some(figures) = app.figures() {
         ui.label(format!(

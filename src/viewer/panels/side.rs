@@ -115,6 +115,8 @@ fn images(app: &mut App, ui: &mut Ui) {
 fn occlusion(app: &mut App, ui: &mut Ui) {
     let size = app.control.as_ref().map_or(1.0, |c| c.scene_size());
     let ao = &mut app.settings.integrators.ao;
+
+    // radius: none, or a length
     ui.horizontal(|ui| {
         let mut is_limited = ao.radius().is_finite();
         let check = ui.checkbox(&mut is_limited, "Radius").on_hover_text(
@@ -148,6 +150,8 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
             }
         }
     });
+
+    // options that have no control of their own
     if let Some(falloff) = ao.ao_falloff {
         ui.weak(format!("Occlusion is halved at this distance: --ao-falloff {}", in_short(falloff)));
     }
@@ -155,7 +159,8 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
     editor::edit(ui, rest, &serde_json::json!({ "ao_normal": "geometric" }));
 }
 
-/// A slider of a length in a scene of this size. A value beyond its ends stays as it is until it is dragged.
+/// A slider of a length in a scene of this size. A value beyond its ends stays as it is until it is
+/// dragged.
 fn length(value: &mut f64, size: f64) -> Slider<'_> {
     let slider = Slider::new(value, round_length(1e-3 * size)..=round_length(2.0 * size)).logarithmic(true);
     slider.clamping(SliderClamping::Edits).suffix(" units")
@@ -193,6 +198,8 @@ fn truth(app: &mut App, ui: &mut Ui) {
     if !is_shown {
         app.compares = compares;
     }
+
+    // which truth
     let shown = app.truth().label();
     let is_truth = |t: Technique| matches!(t, Technique::Converged | Technique::Still(_));
     if let Some(technique) = choose_technique(ui, "Truth", &shown, Some(app.truth()), &is_truth) {
@@ -205,6 +212,8 @@ fn truth(app: &mut App, ui: &mut Ui) {
         let truth = (!follows).then(|| app.truth());
         app.choose_truth(truth);
     }
+
+    // figures of the last comparison
     if !app.compares_now() {
         return;
     }
@@ -226,6 +235,8 @@ fn truth(app: &mut App, ui: &mut Ui) {
         row("Truth's own error, at most", error, help);
         row("Samples of the truth", c.truth_samples.to_string(), "Samples per pixel of the truth so far");
     });
+
+    // a truth that is of something else is said to be
     if matches!(app.first, Technique::Buffer(_)) {
         ui.label("The first image is a buffer: the ambient occlusion behind it is compared.");
     } else if app.first.integrator() != app.truth().integrator() {
@@ -235,8 +246,8 @@ fn truth(app: &mut App, ui: &mut Ui) {
 
 /// Settings that apply to frames, by the name of an integrator's capability.
 fn applicable<'a>(settings: Vec<Setting<'a>>, integrator: &dyn Integrator, hidden: &[&str]) -> Vec<Setting<'a>> {
-    let of = (integrator.name(), integrator.capabilities());
-    settings.into_iter().filter(|s| s.applies.includes(&of) && !hidden.contains(&s.name)).collect()
+    let named = (integrator.name(), integrator.capabilities());
+    settings.into_iter().filter(|s| s.applies.includes(&named) && !hidden.contains(&s.name)).collect()
 }
 
 fn frames(app: &mut App, ui: &mut Ui) {
@@ -275,11 +286,14 @@ fn light(app: &mut App, ui: &mut Ui) {
     if !matches!(app.first, Technique::Still(i) | Technique::Frames(i) if is_lit(i)) {
         ui.label("Light has an effect on path, direct, lit and whitted.");
     }
+
+    // the environment
     let heading =
         ui.label("Environment: a map (.hdr, .exr) or R,G,B").on_hover_text("Enter applies it; empty: the scene's own");
     let id = ui.make_persistent_id("environment text");
     let current = app.lighting.environment.clone().unwrap_or_default();
-    // what is typed is of the environment that there was, unless it has been replaced: by a file that was dropped, say
+    // what is typed is of the environment that there was, unless it has been replaced: by a file
+    // that was dropped, say
     let typed = ui.data_mut(|d| d.get_temp::<(String, String)>(id)).filter(|(of, _)| *of == current);
     let mut text = typed.map_or_else(|| current.clone(), |(_, text)| text);
     let edit = ui.text_edit_singleline(&mut text).labelled_by(heading.id);
@@ -295,6 +309,8 @@ fn light(app: &mut App, ui: &mut Ui) {
         editor::edit(ui, app.lighting.editable(), &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }));
     });
     ui.separator();
+
+    // a light as text
     let heading = ui
         .label("Add a light")
         .on_hover_text(format!("As --light takes it: {}, then key=value", crate::scene::light_spec::kinds()));
@@ -310,6 +326,8 @@ fn light(app: &mut App, ui: &mut Ui) {
         }
     });
     ui.data_mut(|d| d.insert_temp(id, text));
+
+    // lights that were added
     let mut removed = None;
     for (k, light) in app.lighting.light.iter().enumerate() {
         ui.horizontal(|ui| {
@@ -403,6 +421,7 @@ fn animation(app: &mut App, ui: &mut Ui) {
 }
 
 fn device(app: &mut App, ui: &mut Ui) {
+    // devices
     if app.devices.len() > 1 {
         ui.horizontal(|ui| {
             let label = ui.label("Vulkan device");
@@ -422,6 +441,8 @@ fn device(app: &mut App, ui: &mut Ui) {
     } else {
         ui.label(&app.device.name);
     }
+
+    // tracers: those that the device lacks say what is missing
     let (tracer, reason) = app.device.tracer.clone();
     let chosen = app.device_settings.tracer.unwrap_or_default();
     // its pipelines take seconds to compile
@@ -451,6 +472,8 @@ fn device(app: &mut App, ui: &mut Ui) {
         });
         response.response.labelled_by(heading.id);
     });
+
+    // options of the compute tracer
     let is_compute = app.device.tracer.0 == "compute";
     let hidden = ["tracer", "device", "validation"];
     let rest: Vec<Setting> = app.device_settings.editable().into_iter().filter(|s| !hidden.contains(&s.name)).collect();

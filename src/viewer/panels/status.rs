@@ -7,6 +7,7 @@ use crate::viewer::app::App;
 /// Shows the line.
 pub fn show(app: &mut App, ui: &mut Ui) {
     ui.horizontal(|ui| {
+        // the first image and its figures
         if let Some(progress) = &app.panes[0].progress {
             let [w, h] = progress.picture.size;
             let full = app.size();
@@ -32,6 +33,8 @@ pub fn show(app: &mut App, ui: &mut Ui) {
                 .on_hover_text("Error against the truth");
             ui.separator();
         }
+
+        // what goes on beside, and the last message
         if app.is_paused {
             ui.strong("paused");
             ui.separator();

@@ -20,6 +20,7 @@ const MIN_SHARE: f32 = 0.05;
 
 /// Commands of single keys, and of keys with Ctrl.
 pub fn keys(app: &mut App, context: &Context) {
+    // shortcuts work while text is typed; plain keys do not
     for (shortcut, act) in [
         (shortcuts::OPEN, (|app: &mut App| app.dialog = Some(Dialog::Open(String::new()))) as fn(&mut App)),
         (shortcuts::RELOAD, |app| app.reload()),
@@ -36,9 +37,12 @@ pub fn keys(app: &mut App, context: &Context) {
     if context.input(|i| i.events.iter().any(|e| matches!(e, egui::Event::Copy))) {
         menu::copy_command(app);
     }
+
     // a widget that has the focus takes Space and arrows
     let is_free = context.memory(|m| m.focused().is_none());
     let pressed = |key| context.input(|i| i.key_pressed(key) && i.modifiers.matches_logically(Modifiers::NONE));
+
+    // numbers choose techniques
     let light = |name: &str| name.parse().ok().map(Technique::Frames);
     let techniques = [
         (Key::Num1, Some(Technique::Preset(Preset::Fast))),
@@ -52,6 +56,8 @@ pub fn keys(app: &mut App, context: &Context) {
             app.first = technique;
         }
     }
+
+    // images and their comparison
     if pressed(Key::X) {
         menu::toggle_split(app);
     }
@@ -64,6 +70,8 @@ pub fn keys(app: &mut App, context: &Context) {
     if pressed(Key::N) {
         app.shows_panel = !app.shows_panel;
     }
+
+    // camera and time
     if pressed(Key::F) {
         menu::frame_all(app);
     }
@@ -79,6 +87,8 @@ pub fn keys(app: &mut App, context: &Context) {
     if pressed(Key::P) {
         menu::play(app);
     }
+
+    // help
     if context.input(|i| i.key_pressed(Key::Questionmark) || i.key_pressed(Key::F1)) {
         app.shows_help = !app.shows_help;
     }
@@ -169,9 +179,10 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
     let delta = response.drag_delta();
     let (dx, dy) = (f64::from(delta.x), f64::from(delta.y));
     let shift = ui.input(|i| i.modifiers.shift);
-    let (scroll, pinch) = match response.hovered() {
-        true => ui.input(|i| (f64::from(i.smooth_scroll_delta.y), f64::from(i.zoom_delta()))),
-        false => (0.0, 1.0),
+    let (scroll, pinch) = if response.hovered() {
+        ui.input(|i| (f64::from(i.smooth_scroll_delta.y), f64::from(i.zoom_delta())))
+    } else {
+        (0.0, 1.0)
     };
     if delta != Vec2::ZERO || scroll != 0.0 || pinch != 1.0 {
         app.leave_followed();
@@ -230,8 +241,9 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
     }
 }
 
-/// What there is to say over the images: loading, errors, new messages.
+/// Shows what there is to say over the images: loading, errors, new messages.
 fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
+    // the state of loading and rendering, then what failed
     let mut lines: Vec<(String, bool)> = Vec::new();
     let is_loading = app.loading.is_some() || app.control.is_none() && app.source.is_some() && app.failure.is_none();
     let mut share = None;
@@ -258,12 +270,15 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
         lines.extend(app.black(app.shows_second).map(|t| (t.clone(), false)));
         lines.extend(app.new_message().filter(|m| m.2).map(|m| (m.1.clone(), true)));
     }
+
     if lines.is_empty() {
         return;
     }
     if is_loading {
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
     }
+
+    // a box at the bottom, which may offer a remedy
     let width = (rect.width() - 40.0).clamp(120.0, 620.0);
     let (mut dialog_opened, mut cancelled) = (false, false);
     egui::Area::new("notices".into()).pivot(Align2::CENTER_BOTTOM).fixed_pos(rect.center_bottom() - Vec2::new(0.0, 30.0)).show(
@@ -292,6 +307,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
             });
         },
     );
+
     if cancelled {
         app.cancel_loading();
     }

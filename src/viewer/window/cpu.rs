@@ -1,4 +1,5 @@
-//! Presents what the CPU paints: on CPU drivers, where Vulkan would have to wait for the rays that are being traced.
+//! Presents what the CPU paints: on CPU drivers, where Vulkan would have to wait for the rays that
+//! are being traced.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;

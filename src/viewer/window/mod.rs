@@ -26,7 +26,8 @@ const MIN_SIZE: [f64; 2] = [320.0, 240.0];
 
 /// Brings frames to the screen.
 trait Presenter {
-    /// Shows a frame: layers, and the user interface over them, in a window of `size` physical pixels, none of which is 0.
+    /// Shows a frame: layers, and the user interface over them, in a window of `size` physical
+    /// pixels, none of which is 0.
     ///
     /// # Errors
     /// Those of the window system, after which [`Presenter::recover`] is called.
@@ -44,7 +45,7 @@ trait Presenter {
     }
 }
 
-/// What wakes the window.
+/// Reason to wake the window.
 #[derive(Debug)]
 enum Wake {
     /// Something is to be shown at this time.
@@ -157,6 +158,8 @@ impl Viewer {
     fn draw(&mut self, event_loop: &ActiveEventLoop) {
         let Some(open) = &mut self.open else { return };
         self.redraw = None;
+
+        // the interface runs first: it decides what is shown
         let input = open.input.take_egui_input(&open.window);
         self.app.open_dropped(&input.dropped_files);
         let app = &mut self.app;
@@ -166,6 +169,7 @@ impl Viewer {
         if let Some(viewport) = output.viewport_output.get(&egui::ViewportId::ROOT) {
             self.redraw = Instant::now().checked_add(viewport.repaint_delay);
         }
+
         let title = self.app.scene.as_ref().map_or("skylit".to_owned(), |s| format!("{} - skylit", s.source));
         if title != open.title {
             open.window.set_title(&title);
@@ -175,11 +179,13 @@ impl Viewer {
             event_loop.exit();
             return;
         }
+
         let size: [u32; 2] = open.window.inner_size().into();
         // a window that is minimised has no pixels
         if size[0] == 0 || size[1] == 0 {
             return;
         }
+
         match open.presenter.present(size, self.app.layers(), &self.context, &mut open.painted) {
             Ok(()) => {
                 self.presenter_failures = 0;

@@ -47,6 +47,8 @@ impl VulkanPresenter {
             if width == 0 || height == 0 {
                 continue;
             }
+
+            // a picture that is on the device already is not copied again
             let id = *named.entry(Arc::as_ptr(&layer.picture)).or_insert_with(|| {
                 let slot = images.len();
                 let id = TextureId::Managed(FIRST_IMAGE + slot as u64);
@@ -55,15 +57,18 @@ impl VulkanPresenter {
                     let image = ColorImage::from_rgba_unmultiplied([width, height], &layer.picture.rgba);
                     // what has the same size is overwritten
                     let same_size = self.images.get(slot).is_some_and(|image| image.size == layer.picture.size);
-                    let delta = match same_size {
-                        true => ImageDelta::partial([0, 0], image, TextureOptions::LINEAR),
-                        false => ImageDelta::full(image, TextureOptions::LINEAR),
+                    let delta = if same_size {
+                        ImageDelta::partial([0, 0], image, TextureOptions::LINEAR)
+                    } else {
+                        ImageDelta::full(image, TextureOptions::LINEAR)
                     };
                     textures.set.push((id, delta));
                 }
                 images.push(layer.picture.clone());
                 id
             });
+
+            // two triangles, in points
             let point = |k: usize, of: [i32; 4]| Pos2::new(of[k] as f32 / scale, of[k + 1] as f32 / scale);
             let corner = |pos: Pos2, uv: [f32; 2]| Vertex { pos, uv: uv.into(), color: Color32::WHITE };
             let (lo, hi) = (point(0, layer.area), point(2, layer.area));
@@ -80,6 +85,7 @@ impl VulkanPresenter {
             let clip_rect = Rect::from_min_max(point(0, layer.clip), point(2, layer.clip));
             primitives.push(ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) });
         }
+
         // textures of images that are gone
         textures.free.extend((images.len()..self.images.len()).map(|slot| TextureId::Managed(FIRST_IMAGE + slot as u64)));
         self.images = images;

@@ -32,7 +32,7 @@ pub fn is_black(picture: &ViewPicture) -> bool {
     picture.rgba.chunks_exact(4).filter(is_bright).take(most + 1).count() <= most
 }
 
-/// What a camera has in view.
+/// Surfaces that a camera has in view.
 struct Seen {
     /// Share of its rays that hit something.
     hits: f64,
@@ -52,7 +52,8 @@ impl Seen {
     }
 }
 
-/// Why a black image of these settings is black, if that is no property of what it shows. `brightest`: of its values, before they are exposed.
+/// Why a black image of these settings is black, if that is no property of what it shows.
+/// `brightest`: of its values, before they are exposed.
 ///
 /// # Errors
 /// Those of the device.
@@ -64,6 +65,8 @@ pub fn reason(
     brightest: f32,
 ) -> Result<Option<String>> {
     let seen = Seen::by(session, camera, aspect)?;
+
+    // the most likely reason is the first that holds
     let capabilities = settings.integrator().get().capabilities();
     let shows_buffer = settings.frames.show.is_some_and(|show| show != DisplayMode::Result);
     let is_light = capabilities.contains(&Capability::SceneLights);
@@ -98,7 +101,8 @@ pub fn reason(
     Ok(Some(text))
 }
 
-/// The first of some cameras whose image is not black; `None` if all are. `frames`: it shows something from its front, too, if any does.
+/// The first of some cameras whose image is not black; `None` if all are. `frames`: it shows
+/// something from its front, too, if any does.
 ///
 /// # Errors
 /// Those of the device and of `control`.

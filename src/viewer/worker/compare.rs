@@ -9,7 +9,8 @@ use crate::output::palette::heat;
 use crate::renderer::interactive::{ViewPicture, ViewValues};
 use crate::viewer::request::Comparison;
 
-/// Compares the values of two views of the same size, over the pixels that show the scene in either. Where one of them is grey, the luminances are compared.
+/// Compares the values of two views of the same size, over the pixels that show the scene in
+/// either. Where one of them is grey, the luminances are compared.
 ///
 /// # Errors
 /// [`crate::Error::Usage`] for views of different sizes.

@@ -1,4 +1,5 @@
-//! Loads a scene on a thread of its own, its geometry first: ambient occlusion needs no images, and of many scenes they take the longest.
+//! Loads a scene on a thread of its own, its geometry first: ambient occlusion needs no images, and
+//! of many scenes they take the longest.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +13,7 @@ use crate::scene::Scene;
 use crate::scene::load::{self, Confine, ImagesDecoded, LoadOptions};
 use crate::viewer::request::{Event, EventSender, Mailbox};
 
-/// What has been loaded.
+/// Scene or images that have been loaded.
 pub enum Loaded {
     /// Everything but the images, which follow.
     Geometry(Scene),
@@ -31,7 +32,8 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Starts to load a file or `builtin:NAME`; `confine`: where the files lie that it may refer to. Progress is sent as events; `mailbox` is woken for every part.
+    /// Starts to load a file or `builtin:NAME`; `confine`: where the files lie that it may refer
+    /// to. Progress is sent as events; `mailbox` is woken for every part.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] when there can be no further thread.
@@ -119,9 +121,9 @@ impl Job {
         let name = Path::new(&self.source).file_name().unwrap_or_default().to_string_lossy();
         let progress = |images: ImagesDecoded| {
             if !self.is_cancelled.load(Ordering::Relaxed) {
-                let of = images.of.map_or_else(String::new, |n| format!(" of {n}"));
+                let total = images.of.map_or_else(String::new, |n| format!(" of {n}"));
                 let share = images.of.map(|n| images.done as f32 / n.max(1) as f32);
-                self.events.send(Event::Loading(format!("loading {name}: {}{of} images", images.done), share));
+                self.events.send(Event::Loading(format!("loading {name}: {}{total} images", images.done), share));
             }
         };
         load::load_with(&self.source, &LoadOptions { textures, progress: &progress, confine: self.confine })

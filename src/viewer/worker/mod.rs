@@ -29,8 +29,8 @@ use crate::tracer::{DeviceSettings, TracerKind};
 
 /// Time without motion after which the view rests.
 const REST: Duration = Duration::from_millis(150);
-/// Share of a frame's time, at the frame rate to hold, in which it is to be rendered: an input waits for half of the previous frame on average, and the
-/// window takes its part.
+/// Share of a frame's time, at the frame rate to hold, in which it is to be rendered: an input
+/// waits for half of the previous frame on average, and the window takes its part.
 const SHARE: f64 = 0.6;
 /// Least time between two comparisons.
 const COMPARISON: Duration = Duration::from_millis(700);
@@ -82,7 +82,7 @@ struct OpenScene {
     renderer: Renderer,
     load: u64,
     device: DeviceSettings,
-    /// What loads its images, if they are still missing.
+    /// Loader of its images, if they are still missing.
     loader: Option<Loader>,
 }
 
@@ -118,7 +118,8 @@ impl Worker {
         }
     }
 
-    /// Loads the requested scene and opens the device, unless both are there. Returns false if there is nothing to render.
+    /// Loads the requested scene and opens the device, unless both are there. Returns false if
+    /// there is nothing to render.
     fn prepare(&mut self, request: &Request) -> Result<bool> {
         let Some(source) = &request.scene else { return Ok(false) };
         if self.open.as_ref().is_some_and(|open| open.load == request.load) {
@@ -158,8 +159,8 @@ impl Worker {
         }
     }
 
-    /// Loads a scene while the device opens; without its images, if they take long: then what loads them is returned, too. [`Error::Interrupted`] if another
-    /// one is requested meanwhile.
+    /// Loads a scene while the device opens; without its images, if they take long: then what loads
+    /// them is returned, too. [`Error::Interrupted`] if another one is requested meanwhile.
     fn load(
         &self,
         source: &str,
@@ -229,7 +230,8 @@ impl Worker {
         }
     }
 
-    /// Changes the tracer, or the device. Settings that the device does not support leave both as they were.
+    /// Changes the tracer, or the device. Settings that the device does not support leave both as
+    /// they were.
     fn set_device(&mut self, settings: &DeviceSettings) -> Result<()> {
         let Some(OpenScene { renderer, load, device: before, loader }) = self.open.take_if(|o| o.device != *settings) else {
             return Ok(());
@@ -240,9 +242,12 @@ impl Worker {
         let opened =
             if before.options() == settings.options() { Ok(device.clone()) } else { Device::open(&settings.options()) };
         let chosen = opened.and_then(|device| settings.choose(&device.info).map(|(kind, _, _)| (device, kind)));
-        let chosen = chosen.and_then(|(device, kind)| match kind.is_supported_by(&device.info) {
-            true => Ok(device),
-            false => Err(Error::Device(format!("tracer '{kind}' is not available on {}", device.info.name))),
+        let chosen = chosen.and_then(|(device, kind)| {
+            if kind.is_supported_by(&device.info) {
+                Ok(device)
+            } else {
+                Err(Error::Device(format!("tracer '{kind}' is not available on {}", device.info.name)))
+            }
         });
         let renderer = match chosen {
             Ok(chosen) => Renderer::new(chosen, scene, settings)?,
@@ -270,10 +275,12 @@ impl Worker {
         let Some(open) = &mut self.open else { return Ok(()) };
         let tracer_reason = open.renderer.tracer_kind().1.to_owned();
         let loader = open.loader.as_ref();
+
         // an animation of the scene before, until the window knows of this one
         let animations = open.renderer.scene().rig.as_ref().map_or(0, |rig| rig.animations().len());
         let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
+
         open.renderer.apply_scene_settings(&first.meaning);
         // the light may be a file that cannot be read: then there is the one before
         let (mut first, mut refused) = (first.clone(), None);
@@ -290,7 +297,9 @@ impl Worker {
             }
             Err(e) => return Err(e),
         };
-        let mut session = Session {
+
+        // the session runs until another scene or device is requested
+        let mut session = ViewerSession {
             mailbox,
             events,
             interactive,
@@ -312,7 +321,7 @@ impl Worker {
 }
 
 /// Views of a scene, until another scene, device, light or animation is requested.
-struct Session<'a> {
+struct ViewerSession<'a> {
     mailbox: &'a Mailbox,
     events: &'a EventSender,
     interactive: Interactive<'a>,
@@ -330,7 +339,7 @@ struct Session<'a> {
     first: Request,
     /// Lights that were requested and could not be had.
     refused: Option<LightingSettings>,
-    /// What is known of each image at rest.
+    /// Knowledge whether each image at rest is black.
     black: [Blackness; TRUTH + 1],
 }
 
@@ -342,7 +351,7 @@ enum Blackness {
     Visible,
 }
 
-impl Session<'_> {
+impl ViewerSession<'_> {
     fn run(&mut self) -> Result<()> {
         loop {
             let (request, number, changed) = self.mailbox.latest();
@@ -380,9 +389,9 @@ impl Session<'_> {
 
     /// Returns true if this session can do what is requested.
     fn serves(&self, request: &Request) -> bool {
-        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.animation);
+        let source = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.animation);
         let is_lit = request.lighting == self.first.lighting || Some(&request.lighting) == self.refused.as_ref();
-        is_lit && of(request) == of(&self.first)
+        is_lit && source(request) == source(&self.first)
     }
 
     /// Moves the scene and the camera to where they are requested to be.
@@ -422,20 +431,25 @@ impl Session<'_> {
         self.panes.truncate(request.panes.len());
     }
 
-    /// The pane to step next: while something moves those on the screen in turn, else the one that was given the least time.
+    /// The pane to step next: while something moves those on the screen in turn, else the one that
+    /// was given the least time.
     fn next_pane(&self, moves: bool, request: &Request) -> Option<usize> {
         let due = self.panes.iter().enumerate().filter(|(_, p)| !p.has_failed() && !request.is_paused);
-        match moves {
-            true => due.filter(|(k, _)| *k < request.shown).min_by_key(|(_, p)| p.steps()).map(|(k, _)| k),
-            false => due.filter(|(_, p)| !p.is_idle()).min_by_key(|(_, p)| p.spent()).map(|(k, _)| k),
+        if moves {
+            due.filter(|(k, _)| *k < request.shown).min_by_key(|(_, p)| p.steps()).map(|(k, _)| k)
+        } else {
+            due.filter(|(_, p)| !p.is_idle()).min_by_key(|(_, p)| p.spent()).map(|(k, _)| k)
         }
     }
 
     fn step(&mut self, k: usize, request: &Request, number: u64, changed: Instant, camera: &Camera, moves: bool) -> Result<()> {
+        // one step, which a change of the request ends early
         let frame_time = request.frame_rate.map(|rate| Duration::from_secs_f64(SHARE / rate.max(0.1)));
         let mut control = StopOnChange { mailbox: self.mailbox, request, moves };
         let pane = &mut self.panes[k];
         let pacing = Pacing { moves, frame_time };
+
+        // what it showed goes to the window; an error is shown in its place
         match pane.step(&mut self.interactive, camera, &pacing, &mut control) {
             Ok((step, time)) => {
                 let Some(picture) = pane.shown().map(|v| v.picture()).transpose()?.flatten() else { return Ok(()) };
@@ -465,6 +479,7 @@ impl Session<'_> {
                 self.events.send(Event::PaneError(request.pane(k), Some(crate::terminal::console::one_line(&e.to_string()))));
             }
         }
+
         let messages = self.interactive.device().validation_messages().into_iter().map(|m| format!("validation: {m}"));
         for warning in self.interactive.take_warnings().into_iter().chain(messages) {
             self.events.send(Event::Warning(warning));
@@ -480,13 +495,12 @@ impl Session<'_> {
         if std::mem::replace(&mut self.black[pane], now) == now {
             return Ok(());
         }
-        let reason = match is_black {
-            false => None,
-            true => {
-                let values = self.panes[k].shown().map(View::values).transpose()?.unwrap_or_default().values;
-                let brightest = values.into_iter().fold(0.0, f32::max);
-                black::reason(&self.interactive, camera, request.aspect(), &request.panes[k], brightest)?
-            }
+        let reason = if is_black {
+            let values = self.panes[k].shown().map(View::values).transpose()?.unwrap_or_default().values;
+            let brightest = values.into_iter().fold(0.0, f32::max);
+            black::reason(&self.interactive, camera, request.aspect(), &request.panes[k], brightest)?
+        } else {
+            None
         };
         self.events.send(Event::Black(pane, reason));
         Ok(())
@@ -586,7 +600,8 @@ impl Session<'_> {
         }
     }
 
-    /// Compares the first image with the last, if that is requested and both have changed; not too often unless it is the `last` time.
+    /// Compares the first image with the last, if that is requested and both have changed; not too
+    /// often unless it is the `last` time.
     fn compare(&mut self, request: &Request, number: u64, last: bool) -> Result<()> {
         if !request.compares || self.panes.len() < 2 || self.last_motion.elapsed() < REST {
             return Ok(());
@@ -609,7 +624,8 @@ impl Session<'_> {
     }
 }
 
-/// Stops a step when it would be of no use any more. While something moves frames are short and are finished: else a fast motion would show none.
+/// Stops a step when it would be of no use any more. While something moves frames are short and are
+/// finished: else a fast motion would show none.
 struct StopOnChange<'a> {
     mailbox: &'a Mailbox,
     request: &'a Request,
@@ -618,9 +634,10 @@ struct StopOnChange<'a> {
 
 impl Control for StopOnChange<'_> {
     fn should_stop(&mut self) -> Result<bool> {
-        let of = |r: &Request| (r.load, r.size, r.quits);
+        let target = |r: &Request| (r.load, r.size, r.quits);
         let moved = |r: &Request| r.camera != self.request.camera || r.time != self.request.time;
-        let other = |r: &Request| of(r) != of(self.request) || r.device != self.request.device || r.panes != self.request.panes;
+        let other =
+            |r: &Request| target(r) != target(self.request) || r.device != self.request.device || r.panes != self.request.panes;
         let is_useless = self.mailbox.is(|r| other(r) || !self.moves && moved(r));
         if is_useless { Err(Error::Interrupted) } else { Ok(false) }
     }

@@ -1,4 +1,5 @@
-//! An image that is kept up to date: at a resolution that holds the frame rate while something moves, at full resolution once it rests.
+//! An image that is kept up to date: at a resolution that holds the frame rate while something
+//! moves, at full resolution once it rests.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -13,9 +14,11 @@ use crate::scene::Camera;
 const SCALES: [f64; 8] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125, 0.0625];
 /// Scale to start with.
 const FIRST_SCALE: usize = 2;
-/// A finer scale is chosen if a frame of it is expected to take at most this share of the time that there is.
+/// A finer scale is chosen if a frame of it is expected to take at most this share of the time that
+/// there is.
 const HEADROOM: f64 = 0.8;
-/// Frames whose times count. The least of them is taken: drivers compile at the first use of a shader, and other programs run, too.
+/// Frames whose times count. The least of them is taken: drivers compile at the first use of a
+/// shader, and other programs run, too.
 const REMEMBERED: usize = 3;
 /// Frames after which a finer scale is tried again though it was too slow.
 const FORGET: u32 = 20;
@@ -89,7 +92,7 @@ impl Pane {
         }
     }
 
-    /// What it shows does not change any more while nothing moves.
+    /// Returns true if it does not change any more while nothing moves.
     pub fn is_idle(&self) -> bool {
         self.failed || self.is_settled && self.shows_rest
     }
@@ -140,7 +143,8 @@ impl Pane {
         self.size.map(|n| ((f64::from(n) * SCALES[self.scale]).round() as u32).max(1))
     }
 
-    /// Renders the next step. Returns the step and its wall-clock time. After an error the view is gone; [`Error::Interrupted`] says nothing about the settings.
+    /// Renders the next step. Returns the step and its wall-clock time. After an error the view is
+    /// gone; [`Error::Interrupted`] says nothing about the settings.
     ///
     /// # Errors
     /// Those of [`View::new`] and [`View::step`].
@@ -151,12 +155,15 @@ impl Pane {
         pacing: &Pacing,
         control: &mut dyn Control,
     ) -> Result<(ViewStep, Duration)> {
+        // while something moves a smaller image is rendered, to hold the frame rate
         let scales = pacing.moves && pacing.frame_time.is_some() && self.scale > 0;
         let size = if scales { self.scaled() } else { self.size };
         let (slot, other) = if scales { (&mut self.moving, &self.resting) } else { (&mut self.resting, &self.moving) };
         let mut before = slot.take().filter(|v| !v.is_stale(session));
         let is_new = before.as_ref().is_none_or(|v| v.size() != size);
         let was_shown = self.shows_rest != scales;
+
+        // a view of this size, made anew if the one before does not fit
         let mut view = match before.take_if(|_| !is_new) {
             Some(view) => view,
             None => match View::new(session, &self.settings, size, control) {
@@ -165,6 +172,7 @@ impl Pane {
                 made => made?,
             },
         };
+
         // the image that was shown goes on
         let shown = if was_shown { before.as_ref() } else { other.as_ref() };
         if let Some(shown) = shown {
@@ -172,6 +180,8 @@ impl Pane {
             view.continue_from(session, shown, !scales)?;
         }
         drop(before);
+
+        // steps are short while something moves, so that input is answered
         let view = slot.insert(view);
         let time = match () {
             () if pacing.moves => Duration::from_millis(1),
@@ -188,6 +198,8 @@ impl Pane {
                 return Err(e);
             }
         };
+
+        // what the window asks about
         let elapsed = start.elapsed();
         self.shows_rest = !scales;
         self.is_settled = step.is_settled;
@@ -214,7 +226,8 @@ impl Pane {
         let (scale, last) = (self.scale, SCALES.len() - 1);
         let pixels = |k: usize| SCALES[k] * SCALES[k];
         if now > most && times.len() == REMEMBERED && scale < last {
-            // time does not fall below what does not depend on pixels: one step at a time unless it is far too slow
+            // time does not fall below what does not depend on pixels: one step at a time unless it
+            // is far too slow
             let fits = |k: &usize| now * pixels(*k) / pixels(scale) <= most;
             self.scale = if now > 2.0 * most { (scale + 1..last).find(fits).unwrap_or(last) } else { scale + 1 };
         } else if scale > 0 && now <= most {

@@ -13,9 +13,11 @@ use crate::scene::{AnimationRig, Scene};
 /// The node hierarchy that is being written.
 pub(super) struct Tree {
     pub nodes: Vec<Value>,
-    /// Nodes without a parent, in an order in which loaders meet the instances in that of the scene.
+    /// Nodes without a parent, in an order in which loaders meet the instances in that of the
+    /// scene.
     pub roots: Vec<usize>,
-    /// For each node of the rig, the written nodes whose meshes have morph targets with its weights.
+    /// For each node of the rig, the written nodes whose meshes have morph targets with its
+    /// weights.
     morphing: BTreeMap<usize, Vec<usize>>,
     /// The written nodes of the lights that the rig carries.
     pub lights: BTreeMap<usize, usize>,
@@ -29,6 +31,8 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
         tree.roots = (0..tree.nodes.len()).collect();
         return tree;
     };
+
+    // nodes with their children
     let parts = rig.parts();
     tree.nodes = parts.nodes.iter().map(|n| local(&n.name, &n.local)).collect();
     // the first instance in each tree
@@ -41,6 +45,8 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
         }
         above.push(node.parent.map_or(i, |p| above[p]));
     }
+
+    // meshes go to the nodes that carry them, or to nodes of their own
     let deforming: BTreeMap<usize, &Deformation> = parts.deformations.iter().map(|d| (d.mesh, d)).collect();
     for (i, instance) in scene.instances.iter().enumerate() {
         let deformation = deforming.get(&instance.mesh);
@@ -62,8 +68,12 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
         let least = first.entry(above[on]).or_insert(i);
         *least = i.min(*least);
     }
+
+    // trees in the order of their first instances, so that a reader finds them as they were
     tree.roots = first.keys().copied().collect();
     tree.roots.sort_by_key(|r| first[r]);
+
+    // cameras and lights
     for (c, camera) in scene.cameras.iter().enumerate() {
         if let Some(on) = carries_camera(rig, c) {
             let at = tree.carrier(on, &camera.name, "camera");
@@ -89,7 +99,8 @@ pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize>
 }
 
 impl Tree {
-    /// The node for a mesh, camera or light: `on` itself if it has the same name and is free, else a new child of it.
+    /// The node for a mesh, camera or light: `on` itself if it has the same name and is free, else
+    /// a new child of it.
     fn carrier(&mut self, on: usize, name: &str, what: &str) -> usize {
         let there = &self.nodes[on];
         if there.get(what).is_none() && there["name"] == name {
@@ -108,10 +119,8 @@ impl Writer {
         for (set, influences) in deformation.influences.iter().enumerate() {
             let small = influences.joints.iter().flatten().all(|&j| j < 256);
             let joints = influences.joints.iter().flatten();
-            let bytes: Vec<u8> = match small {
-                true => joints.map(|&j| j as u8).collect(),
-                false => joints.flat_map(|j| j.to_le_bytes()).collect(),
-            };
+            let bytes: Vec<u8> =
+                if small { joints.map(|&j| j as u8).collect() } else { joints.flat_map(|j| j.to_le_bytes()).collect() };
             let view = self.view(&bytes, Some(34962));
             let component = if small { 5121 } else { 5123 };
             self.accessors.push(json!({ "bufferView": view, "componentType": component, "count": vertices, "type": "VEC4" }));

@@ -1,8 +1,9 @@
-//! `.brhan`: the text scenes of Larsen's reference path tracer. A camera, render settings, OBJ (or glTF) models with
-//! transforms and materials, spheres.
+//! `.brhan`: the text scenes of Larsen's reference path tracer. A camera, render settings, OBJ (or
+//! glTF) models with transforms and materials, spheres.
 //!
-//! Spheres stay analytic. A `SphericalLight` is a sphere with an emissive material and nothing else: it is seen by camera
-//! rays and counted once, as an emissive surface, not again in [`Scene::lights`].
+//! Spheres stay analytic. A `SphericalLight` is a sphere with an emissive material and nothing
+//! else: it is seen by camera rays and counted once, as an emissive surface, not again in
+//! [`Scene::lights`].
 
 mod parse;
 
@@ -172,7 +173,8 @@ impl Loader<'_> {
     }
 }
 
-/// Moves a model's meshes, materials and textures into `scene`; returns its instances, which are not placed yet.
+/// Moves a model's meshes, materials and textures into `scene`; returns its instances, which are
+/// not placed yet.
 fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
     let (meshes, materials, textures) = (scene.meshes.len(), scene.materials.len(), scene.textures.len());
     scene.textures.extend(model.textures);
@@ -189,8 +191,8 @@ fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
     model.instances.into_iter().map(|i| Instance { mesh: i.mesh + meshes, ..i }).collect()
 }
 
-/// A sphere, and the point that its centre is relative to: the centre itself where single precision would move it by more
-/// than it rounds the sphere's own extent, and zero else.
+/// A sphere, and the point that its centre is relative to: the centre itself where single precision
+/// would move it by more than it rounds the sphere's own extent, and zero else.
 fn sphere(s: &mut Statement) -> Result<(Sphere, DVec3), String> {
     let line = s.line;
     let center = s.vector("center")?.unwrap_or(DVec3::ZERO);
@@ -203,9 +205,10 @@ fn sphere(s: &mut Statement) -> Result<(Sphere, DVec3), String> {
     Ok((Sphere { center: (center - place).as_vec3(), radius }, place))
 }
 
-/// `translate * rotate_z * rotate_y * rotate_x * scale`: a point is scaled, turned about x, y and z in the order in which
-/// the angles are written, and moved. No description of the format says so; turning about one axis, as most samples do,
-/// is the same in any order, and the one sample that turns about three comes out closest to upright in this one.
+/// `translate * rotate_z * rotate_y * rotate_x * scale`: a point is scaled, turned about x, y and z
+/// in the order in which the angles are written, and moved. No description of the format says so;
+/// turning about one axis, as most samples do, is the same in any order, and the one sample that
+/// turns about three comes out closest to upright in this one.
 fn transform(s: &mut Statement) -> Result<DAffine3, String> {
     let translate = s.vector("translate")?.unwrap_or(DVec3::ZERO);
     let degrees = s.vector("rotate")?.unwrap_or(DVec3::ZERO);
@@ -224,6 +227,8 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
     let reflectance = s.color("reflectance")?;
     let transmittance = s.color("transmittance")?;
     let sigma = s.number("sigma")?;
+
+    // a material without a name is the default
     let Some(name) = name else { return Ok(None) };
     let kind = match name {
         "matte" => MaterialKind::Matte,
@@ -236,6 +241,7 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
             return Err(format!("line {line}: unknown material `{other}` ({known})"));
         }
     };
+
     let metal = matches!(kind, MaterialKind::Mirror | MaterialKind::Copper | MaterialKind::Gold);
     // what the kind stands for, so that renderers that know metallic-roughness only come close
     let tint = match kind {
@@ -243,6 +249,7 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
         MaterialKind::Gold => Vec3::new(1.0, 0.782, 0.344),
         _ => Vec3::ONE,
     };
+
     let specular_color = specular.or(reflectance).unwrap_or(if kind == MaterialKind::Matte { Vec3::ZERO } else { tint });
     let glass = kind == MaterialKind::Glass;
     Ok(Some(Material {

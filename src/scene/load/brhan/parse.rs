@@ -1,4 +1,5 @@
-//! The statements of a `.brhan` file: `Key name[values] name[values] ...`, one a line, `#` starts a comment.
+//! The statements of a `.brhan` file: `Key name[values] name[values] ...`, one a line, `#` starts a
+//! comment.
 
 use glam::{DVec3, Vec3};
 
@@ -7,10 +8,10 @@ use crate::scene::load::text;
 /// One line: a key with its own values (`SaveIntervals[4]`) and named values.
 #[derive(Debug)]
 pub(super) struct Statement<'a> {
-    /// From 1.
+    /// Number of the line, from 1.
     pub line: usize,
     pub key: &'a str,
-    /// What stands in brackets right after the key.
+    /// Text in brackets right after the key.
     own: Option<&'a str>,
     fields: Vec<(&'a str, &'a str)>,
     /// Fields that the loader has read, to report unknown ones.
@@ -119,9 +120,10 @@ impl<'a> Statement<'a> {
     }
 
     fn whole(&self, x: f64, min: u32) -> Result<u32, String> {
-        match x.fract() == 0.0 && x >= f64::from(min) && x <= 1e6 {
-            true => Ok(x as u32),
-            false => Err(format!("a whole number from {min} to 1000000 expected")),
+        if x.fract() == 0.0 && x >= f64::from(min) && x <= 1e6 {
+            Ok(x as u32)
+        } else {
+            Err(format!("a whole number from {min} to 1000000 expected"))
         }
     }
 

@@ -49,14 +49,16 @@ fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {
     for p in 0..POINTS * POINTS {
         let at =
             |pixel: u32, point: u32, n: u32| (f64::from(pixel) + (f64::from(point) + 0.5) / f64::from(POINTS)) / f64::from(n);
-        // from the upper left corner; -z is in the middle, +x to the right of it (shaders/path/map.glsl)
+        // from the upper left corner; -z is in the middle, +x to the right of it
+        // (shaders/path/map.glsl)
         let (phi, theta) = (2.0 * PI * (at(x, p % POINTS, width) - 0.5), PI * at(y, p / POINTS, height));
         sum += look_up(faces, DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()));
     }
     sum / (POINTS * POINTS) as f32
 }
 
-/// Samples the cube map with OpenGL's face orientation (OpenGL 4.6, table 8.19), bilinearly within a face.
+/// Samples the cube map with OpenGL's face orientation (OpenGL 4.6, table 8.19), bilinearly within
+/// a face.
 fn look_up(faces: &[Pixels], d: DVec3) -> Vec3 {
     let a = d.abs();
     let (face, s, t, m) = if a.x >= a.y && a.x >= a.z {
@@ -94,7 +96,8 @@ mod tests {
         for (k, axis) in axes.into_iter().enumerate() {
             assert_eq!(look_up(&faces, (axis + DVec3::new(0.1, 0.2, -0.15)).normalize()).x, k as f32);
         }
-        // a texel in the middle of the image looks along -z, one a quarter to the right of it along +x
+        // a texel in the middle of the image looks along -z, one a quarter to the right of it along
+        // +x
         let [w, h] = [64, 32];
         assert_eq!(texel(&faces, [w, h], 16 * w + 32).x, 5.0);
         assert_eq!(texel(&faces, [w, h], 16 * w + 48).x, 0.0);

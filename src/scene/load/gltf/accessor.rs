@@ -1,4 +1,5 @@
-//! Typed arrays in buffers. Every range is checked against the buffer view and the buffer before a byte is read.
+//! Typed arrays in buffers. Every range is checked against the buffer view and the buffer before a
+//! byte is read.
 
 use std::borrow::Cow;
 
@@ -8,20 +9,22 @@ use ::gltf::json::{Index, Root, buffer};
 use super::values::valid;
 use crate::memory::Budget;
 
-/// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for whoever needs it.
+/// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for
+/// whoever needs it.
 pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
 
 /// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
 pub(super) struct Reader<'a> {
     pub document: &'a Root,
     pub buffers: &'a [BufferBytes<'a>],
-    /// What arrays are taken from.
+    /// Budget that the memory of arrays is taken from.
     pub budget: &'a Budget,
 }
 
 /// Reads one component of an element.
 trait Decode {
-    /// The float at the start of `b`; normalised integers map to [0, 1] or [-1, 1] as the specification says.
+    /// The float at the start of `b`; normalised integers map to [0, 1] or [-1, 1] as the
+    /// specification says.
     fn float(self, b: &[u8], normalized: bool) -> f32;
     /// The unsigned integer at the start of `b`.
     fn index(self, b: &[u8]) -> u32;
@@ -110,7 +113,7 @@ impl<'a> Reader<'a> {
         usize::try_from(self.accessor(index)?.count.0).map_err(|_| format!("accessor {index} has too many elements"))
     }
 
-    /// What an element is.
+    /// Returns the type of an accessor's elements.
     pub(super) fn shape(&self, index: Index<Accessor>) -> Result<Option<Type>, String> {
         Ok(valid(self.accessor(index)?.type_))
     }
@@ -233,7 +236,8 @@ impl<'a> Reader<'a> {
         Ok(Indices::Owned(all))
     }
 
-    /// Makes room for what is read of an accessor. Nothing in the file bounds those without data, which are all zeros, and several uses of one have a copy each.
+    /// Makes room for what is read of an accessor. Nothing in the file bounds those without data,
+    /// which are all zeros, and several uses of one have a copy each.
     fn take(&self, bytes: u64, count: u64) -> Result<(), String> {
         self.budget.take(bytes, || format!("an accessor of {count} elements"))
     }

@@ -10,7 +10,8 @@ use serde::Deserialize;
 use super::accessor::Reader;
 use crate::scene::animation::{self, Channel, Interpolation, LocalTransform, Node, Property, Sampler};
 
-/// An animation in the file. Nothing is required here: what is missing leaves out a channel, and not the whole scene.
+/// An animation in the file. Nothing is required here: what is missing leaves out a channel, and
+/// not the whole scene.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Animation {
@@ -47,8 +48,8 @@ pub(super) fn transformed(animations: &[Animation]) -> BTreeSet<usize> {
     animations.iter().flat_map(|a| &a.channels).filter(transforms).filter_map(|channel| channel.target.node).collect()
 }
 
-/// All animations, whose channels refer to `nodes`; `index` has the index there of each node of the file. Invalid channels are left out,
-/// with a warning each.
+/// All animations, whose channels refer to `nodes`; `index` has the index there of each node of the
+/// file. Invalid channels are left out, with a warning each.
 pub(super) fn read(
     reader: &Reader,
     animations: &[Animation],
@@ -84,7 +85,8 @@ pub(super) fn read(
     out
 }
 
-/// `None` for a channel of a node that is not in the scene. `repairs`: what was wrong with it and could be mended.
+/// `None` for a channel of a node that is not in the scene. `repairs`: what was wrong with it and
+/// could be mended.
 fn read_channel(
     reader: &Reader,
     animation: &Animation,
@@ -96,6 +98,8 @@ fn read_channel(
 ) -> Result<Option<Channel>, String> {
     let target = channel.target.node.ok_or_else(|| format!("names no node (its path is `{}`)", channel.target.path))?;
     let Some(node) = *index.get(target).ok_or_else(|| format!("node {target} does not exist"))? else { return Ok(None) };
+
+    // the property, and how many numbers it has
     let (property, shape) = match channel.target.path.as_str() {
         "translation" => (Property::Translation, Type::Vec3),
         "rotation" => (Property::Rotation, Type::Vec4),
@@ -114,6 +118,8 @@ fn read_channel(
         (Property::Rotation, _) => 4,
         _ => 3,
     };
+
+    // the sampler
     let number = channel.sampler.ok_or("names no sampler")?;
     let sampler = animation.samplers.get(number).ok_or_else(|| format!("sampler {number} does not exist"))?;
     let within = |e: String| format!("sampler {number}: {e}");
@@ -126,6 +132,8 @@ fn read_channel(
     let (Some(input), Some(output)) = (sampler.input, sampler.output) else {
         return Err(within("lacks an accessor".to_owned()));
     };
+
+    // channels may share their times
     let times = match times.get(&input) {
         Some(known) => known.clone(),
         None => {
@@ -134,12 +142,14 @@ fn read_channel(
             read
         }
     };
+
     let output = Index::new(output);
     let values = match shape {
         Type::Scalar => reader.floats(output, shape, |v: [f32; 1]| v).map(|v| v.as_flattened().to_vec()),
         Type::Vec3 => reader.floats(output, shape, |v: [f32; 3]| v).map(|v| v.as_flattened().to_vec()),
         _ => reader.floats(output, shape, |v: [f32; 4]| v).map(|v| v.as_flattened().to_vec()),
     };
+
     let mut sampler = Sampler { interpolation, times, values: values.map_err(within)? };
     for said in sampler.repair(width) {
         repairs.push(within(said));

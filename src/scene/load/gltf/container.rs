@@ -1,4 +1,4 @@
-//! From files to the JSON document and its buffers.
+//! Reads files into the JSON document and its buffers.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -25,9 +25,10 @@ pub(super) fn split<'a>(file: &'a [u8], path: &Path) -> Result<Chunks<'a>> {
         let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
         let json = utf8(file);
         let is_json = json.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
-        return match is_glb && !is_json {
-            true => Err(Error::input(path, "is not a .glb file (it does not begin with `glTF`)")),
-            false => Ok(Chunks { json, bin: None }),
+        return if is_glb && !is_json {
+            Err(Error::input(path, "is not a .glb file (it does not begin with `glTF`)"))
+        } else {
+            Ok(Chunks { json, bin: None })
         };
     }
     let truncated = || Error::input(path, "is truncated: the .glb ends before its header says so");
@@ -59,7 +60,8 @@ pub(super) fn split<'a>(file: &'a [u8], path: &Path) -> Result<Chunks<'a>> {
     Ok(Chunks { json: utf8(json), bin })
 }
 
-/// Where the binary chunk begins; `at`: the end of the chunk before. Chunks of other kinds are skipped, as the specification wants, and padding that no chunk counts.
+/// Where the binary chunk begins; `at`: the end of the chunk before. Chunks of other kinds are
+/// skipped, as the specification wants, and padding that no chunk counts.
 fn binary_chunk(whole: &[u8], mut at: usize) -> Option<usize> {
     loop {
         let is_binary = |at: &usize| whole.get(at + 4..at + 8) == Some(b"BIN\0");
@@ -75,7 +77,8 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
 }
 
-/// JSON as UTF-8 without what some writers put around it: a byte order mark, the zeros of padding, the two bytes a character of other encodings.
+/// JSON as UTF-8 without what some writers put around it: a byte order mark, the zeros of padding,
+/// the two bytes a character of other encodings.
 fn utf8(text: &[u8]) -> Cow<'_, [u8]> {
     let wide = |pair: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = text[2..].as_chunks().0.iter().map(|&b| pair(b)).collect();
@@ -174,7 +177,8 @@ pub(super) fn document(text: &[u8], path: &Path) -> Result<(Root, Doubles)> {
     let document = Root::from_slice(text).or_else(|e| lenient(text).ok_or(e));
     let document = match document.and_then(|document| Ok((document, serde_json::from_slice(text)?))) {
         Ok(document) => document,
-        // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a type error
+        // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a
+        // type error
         Err(e) => match serde_json::from_slice::<AssetOnly>(text).map(|a| a.asset.version) {
             Ok(serde_json::Value::Number(version)) => return Err(other_version(&version.to_string(), path)),
             Ok(version) if version.as_str().is_none_or(str::is_empty) => {
@@ -196,10 +200,11 @@ fn other_version(version: &str, path: &Path) -> Error {
     Error::input(path, format!("is glTF {version}; skylit reads glTF 2.0{remedy}"))
 }
 
-/// The document without what a still image does not need and the crate is too strict about: it wants `nodes` in a scene
-/// and `node` in the target of an animation, both optional by the specification (for scenes without content, and for
-/// KHR_animation_pointer), and clipping planes of cameras, which some files lack; and it refuses numbers beyond the range of
-/// single precision. `None` if that does not help.
+/// The document without what a still image does not need and the crate is too strict about: it
+/// wants `nodes` in a scene and `node` in the target of an animation, both optional by the
+/// specification (for scenes without content, and for KHR_animation_pointer), and clipping planes
+/// of cameras, which some files lack; and it refuses numbers beyond the range of single precision.
+/// `None` if that does not help.
 fn lenient(text: &[u8]) -> Option<Root> {
     let mut root: Value = serde_json::from_slice(text).ok()?;
     for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
@@ -269,9 +274,12 @@ pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, l
             *used = true;
         }
     }
-    let read = |(i, buffer): (usize, &Buffer)| match used[i] {
-        true => read_buffer(i, buffer, bin, path, loading).map_err(|e| format!("buffer {i} {e}")),
-        false => Err(format!("buffer {i} is not used by a buffer view")),
+    let read = |(i, buffer): (usize, &Buffer)| {
+        if used[i] {
+            read_buffer(i, buffer, bin, path, loading).map_err(|e| format!("buffer {i} {e}"))
+        } else {
+            Err(format!("buffer {i} is not used by a buffer view"))
+        }
     };
     document.buffers.iter().enumerate().map(read).collect()
 }

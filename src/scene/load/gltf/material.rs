@@ -1,4 +1,5 @@
-//! Materials: core metallic-roughness and the KHR_materials extensions, to [`crate::scene::Material`].
+//! Materials: core metallic-roughness and the KHR_materials extensions, to
+//! [`crate::scene::Material`].
 
 use std::collections::BTreeMap;
 
@@ -17,7 +18,7 @@ trait UnmodelledExtension: Default + for<'a> Deserialize<'a> {
     const NAME: &str;
 
     /// Reads it from the extensions of an object, with its default where it is absent.
-    fn of(extensions: Option<&Map<String, Value>>) -> Result<Self, String> {
+    fn from_extensions(extensions: Option<&Map<String, Value>>) -> Result<Self, String> {
         match extensions.and_then(|e| e.get(Self::NAME)) {
             Some(value) => Self::deserialize(value).map_err(|e| format!("{}: {e}", Self::NAME)),
             None => Ok(Self::default()),
@@ -64,13 +65,14 @@ impl UnmodelledExtension for AnisotropyJson {
     const NAME: &str = "KHR_materials_anisotropy";
 }
 
-/// The crate models it on textures of its type `Info` only, which those for normals and occlusion are not.
+/// The crate models it on textures of its type `Info` only, which those for normals and occlusion
+/// are not.
 impl UnmodelledExtension for TextureTransform {
     const NAME: &str = "KHR_texture_transform";
 }
 
-/// `translation * rotation * scale` of the extension. Its rotation is counter-clockwise as seen in an image whose v points
-/// down, hence the signs.
+/// `translation * rotation * scale` of the extension. Its rotation is counter-clockwise as seen in
+/// an image whose v points down, hence the signs.
 fn affine(t: &TextureTransform) -> Affine2 {
     let (s, c) = t.rotation.0.sin_cos();
     let rotation = Mat2::from_cols(Vec2::new(c, -s), Vec2::new(s, c));
@@ -95,17 +97,17 @@ fn slot(info: &Option<Info>) -> Option<TextureSlot> {
 
 fn normal_slot(info: &Option<json::NormalTexture>) -> Result<Option<TextureSlot>, String> {
     let Some(info) = info else { return Ok(None) };
-    let transform = TextureTransform::of(info.extensions.as_ref().map(|e| &e.others))?;
+    let transform = TextureTransform::from_extensions(info.extensions.as_ref().map(|e| &e.others))?;
     Ok(Some(make_slot(info.index.value(), info.tex_coord, Some(&transform))))
 }
 
 fn occlusion_slot(info: &Option<json::OcclusionTexture>) -> Result<Option<TextureSlot>, String> {
     let Some(info) = info else { return Ok(None) };
-    let transform = TextureTransform::of(info.extensions.as_ref().map(|e| &e.others))?;
+    let transform = TextureTransform::from_extensions(info.extensions.as_ref().map(|e| &e.others))?;
     Ok(Some(make_slot(info.index.value(), info.tex_coord, Some(&transform))))
 }
 
-/// What a primitive without a material looks like.
+/// Material of a primitive that names none.
 pub(super) fn default_material() -> Material {
     // without extensions nothing can fail
     convert(&json::Material::default()).unwrap_or_default()
@@ -138,8 +140,8 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         double_sided: material.double_sided,
         ior: extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |i| i.ior.0),
         unlit: extensions.is_some_and(|e| e.unlit.is_some()),
-        clearcoat: ClearcoatJson::of(others)?.to_scene()?,
-        sheen: SheenJson::of(others)?.to_scene(),
+        clearcoat: ClearcoatJson::from_extensions(others)?.to_scene()?,
+        sheen: SheenJson::from_extensions(others)?.to_scene(),
         transmission: transmission(material),
         dielectric_priority: dielectric_priority(material)?,
         specular: specular.map_or_else(Specular::default, |s| Specular {
@@ -148,7 +150,7 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
             color: s.specular_color_factor.0.into(),
             color_texture: slot(&s.specular_color_texture),
         }),
-        anisotropy: AnisotropyJson::of(others)?.to_scene(),
+        anisotropy: AnisotropyJson::from_extensions(others)?.to_scene(),
         parameters: parameters(material),
         ..Material::default()
     })

@@ -9,7 +9,8 @@ use super::accessor::{Indices, Reader};
 use super::values::{AccessorIndex, valid};
 use crate::scene::TriangleMesh;
 
-/// Reads a primitive; `None` for points and lines, which have no surface. `tangents` says whether the material needs them.
+/// Reads a primitive; `None` for points and lines, which have no surface. `tangents` says whether
+/// the material needs them.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -30,6 +31,8 @@ pub(super) fn read(
             return Ok(None);
         }
     };
+
+    // positions, which decide how many vertices there are
     let attribute = |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
     let Some(position) = attribute(Semantic::Positions) else {
         warn("has no positions: skipped".to_owned());
@@ -71,6 +74,8 @@ pub(super) fn read(
             _ => reader.floats(same_count(a)?, Type::Vec4, Vec4::from_array)?,
         };
     }
+
+    // corners
     mesh.indices = match primitive.indices {
         Some(accessor) => {
             let indices = reader.indices(accessor)?;
@@ -83,6 +88,7 @@ pub(super) fn read(
         }
         None => triangles(mode, vertices, |i| i as u32),
     };
+
     if mode == Mode::Triangles {
         let corners = match primitive.indices {
             Some(accessor) => reader.count(accessor)?,
@@ -95,7 +101,8 @@ pub(super) fn read(
     Ok(Some(mesh))
 }
 
-/// Triangles of a list, strip or fan of `n` corners, all counter-clockwise as the specification orders them.
+/// Triangles of a list, strip or fan of `n` corners, all counter-clockwise as the specification
+/// orders them.
 fn triangles(mode: Mode, n: usize, corner: impl Fn(usize) -> u32) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => (0..n / 3).map(|t| [corner(3 * t), corner(3 * t + 1), corner(3 * t + 2)]).collect(),

@@ -1,9 +1,11 @@
 //! glTF 2.0: `.gltf` with external files or data URIs, and `.glb`.
 //!
 //! The crate `gltf` reads the JSON. Its validation is left out: it would refuse quantised
-//! meshes and every extension that it does not know; so are its chunks of `.glb` files, which refuse what the specification wants skipped. Hence indices are checked where they are used, values that it calls
-//! invalid are told where they matter, extensions that it does not model come from the maps in which it keeps them, and
-//! accessors are read by a reader of our own, which checks every range.
+//! meshes and every extension that it does not know; so are its chunks of `.glb` files, which
+//! refuse what the specification wants skipped. Hence indices are checked where they are used,
+//! values that it calls invalid are told where they matter, extensions that it does not model come
+//! from the maps in which it keeps them, and accessors are read by a reader of our own, which
+//! checks every range.
 //!
 //! <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
 
@@ -52,6 +54,7 @@ const KNOWN: &[&str] = &[
 
 /// Reads a `.gltf` or `.glb` file.
 pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
+    // the document and its buffers
     let file = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
     let budget = loading.budget;
     budget.read(file.len());
@@ -65,11 +68,13 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();
+
     let material = |(i, m)| material::convert(m).map_err(|e| Error::input(path, format!("material {i}: {e}")));
     scene.materials = document.materials.iter().enumerate().map(material).collect::<Result<_>>()?;
     (scene.textures, scene.report.skipped_images) =
         texture::resolve(&reader, path, &mut scene.materials, loading, &mut |w| warnings.push(w));
 
+    // nodes, and what they carry
     let input = |e| Error::input(path, e);
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
     let mut meshes = Meshes { reader: &reader, path, primitives: BTreeMap::new(), default_material: None };
@@ -78,7 +83,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         let name = text(&node.name);
         if let Some(index) = node.mesh {
             let wanted = stage.wanted(at, index.value()).map_err(input)?;
-            for made in meshes.of(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
+            for made in meshes.read_mesh(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
                 // the node's transform does not apply to a skinned mesh
                 let object_to_world = made.anchor.map_or(placed.to_world, DAffine3::from_translation);
                 scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
@@ -154,7 +159,7 @@ struct LoadedMesh {
 
 impl Meshes<'_> {
     /// `at`: the placed node that carries it.
-    fn of(
+    fn read_mesh(
         &mut self,
         wanted: &MeshVariant,
         at: usize,
@@ -165,6 +170,8 @@ impl Meshes<'_> {
         if let Some(known) = self.primitives.get(wanted) {
             return Ok(known.clone());
         }
+
+        // a mesh that is read for another node again has said its warnings already
         let index = wanted.mesh;
         let meshes = &self.reader.document.meshes;
         let mesh = meshes.get(index).ok_or_else(|| Error::input(self.path, format!("mesh {index} does not exist")))?;
@@ -173,6 +180,7 @@ impl Meshes<'_> {
         let mut made = Vec::new();
         for (nth, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index} `{name}`, primitive {nth}");
+
             // once is enough
             let mut warn = |w: String| {
                 if !again {
@@ -188,6 +196,8 @@ impl Meshes<'_> {
                     scene.materials.len() - 1
                 }),
             };
+
+            // the primitive, with what deforms it
             let tangents = scene.materials[material].needs_tangents();
             let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &mut warn).map_err(input)? else { continue };
             let mut deformation = stage.deformation(wanted, primitive, &triangles, at, &mut warn).map_err(input)?;

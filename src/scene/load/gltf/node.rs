@@ -12,8 +12,8 @@ use crate::scene::animation::LocalTransform;
 use crate::scene::camera::rigid;
 use crate::scene::{Camera, ClipPlanes, Light, LightKind, Projection};
 
-/// Transforms and cameras in double precision: the crate rounds them to single precision, which is too coarse for far-away scenes
-/// and would not survive a round trip through our exporter.
+/// Transforms and cameras in double precision: the crate rounds them to single precision, which is
+/// too coarse for far-away scenes and would not survive a round trip through our exporter.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Doubles {
@@ -67,8 +67,9 @@ pub(super) struct PlacedNode {
     pub shown: bool,
 }
 
-/// Every node of the scene with its world transform, parents before children, in the order of the file. With `all` the nodes outside
-/// of the scene follow, whose transforms the joints of skins may want.
+/// Every node of the scene with its world transform, parents before children, in the order of the
+/// file. With `all` the nodes outside of the scene follow, whose transforms the joints of skins may
+/// want.
 ///
 /// # Errors
 /// What is wrong, in words: indices out of range, nodes reached twice.
@@ -80,16 +81,22 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
             *parents.get_mut(child).ok_or_else(|| format!("node {i} has the child {child}, which does not exist"))? += 1;
         }
     }
-    // a node under two parents is no tree; a few of them in a row would mean exponentially many instances
+
+    // a node under two parents is no tree; a few of them in a row would mean exponentially many
+    // instances
     if let Some(i) = parents.iter().position(|&p| p > 1) {
         return Err(format!("node {i} is the child of more than one node"));
     }
+
+    // roots of the scene, or of everything where there is none
     let no_scene = document.scenes.is_empty();
     let roots: Vec<usize> = match document.scene.map(|s| s.value()) {
         Some(s) if s >= document.scenes.len() => return Err(format!("the default scene {s} does not exist")),
         _ if no_scene => (0..nodes.len()).filter(|&i| parents[i] == 0).collect(),
         s => document.scenes[s.unwrap_or(0)].nodes.iter().map(Index::value).collect(),
     };
+
+    // nodes from their roots down
     let mut placed = Vec::new();
     let mut seen = vec![false; nodes.len()];
     let outside = (0..nodes.len()).filter(|&i| all && parents[i] == 0);
@@ -119,6 +126,8 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
             stack.extend(children(node).rev().map(|c| (c, Some(index))));
         }
     }
+
+    // without a scene a circle has no root, so that no node of it was placed
     if no_scene && let Some(i) = seen.iter().position(|s| !s) {
         return Err(format!("node {i} is its own ancestor"));
     }

@@ -1,4 +1,5 @@
-//! Construction of the rig: meshes that deform over time become part of it, meshes with a constant pose are posed here.
+//! Construction of the rig: meshes that deform over time become part of it, meshes with a constant
+//! pose are posed here.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,8 @@ use super::{animation, skin};
 use crate::scene::animation::{Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor};
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
-/// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the scene's meshes.
+/// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the
+/// scene's meshes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct MeshVariant {
     /// Number in the file.
@@ -34,13 +36,14 @@ impl MeshVariant {
 enum Weights {
     /// All zero, or no targets.
     None,
-    /// The same at all times; the bits of floats, so that they have an order.
+    /// Weights that stay the same at all times; the bits of floats, so that they have an order.
     Fixed(Vec<u32>),
-    /// Those of a placed node, which an animation changes.
+    /// Weights of a placed node, which an animation changes.
     Animated(usize),
 }
 
-/// The tree and its animations while the scene is read. Nodes are numbered as they are placed, skins as in the file.
+/// The tree and its animations while the scene is read. Nodes are numbered as they are placed,
+/// skins as in the file.
 pub(super) struct RigBuilder<'a> {
     reader: &'a Reader<'a>,
     doubles: &'a Doubles,
@@ -53,7 +56,8 @@ pub(super) struct RigBuilder<'a> {
     moves: Vec<bool>,
     morphs: Vec<bool>,
     skins: BTreeMap<usize, Skin>,
-    /// Of skins that deform a mesh: whether an animation moves a joint, and the matrices of the joints at rest.
+    /// Skins that deform a mesh: whether an animation moves a joint, and the matrices of the joints
+    /// at rest.
     rests: BTreeMap<usize, (bool, Vec<DAffine3>)>,
     deformations: Vec<Deformation>,
     /// The placed node of each instance of the scene; `None` for skinned meshes.
@@ -71,6 +75,8 @@ impl<'a> RigBuilder<'a> {
         for (at, p) in placed.iter().enumerate() {
             index[p.node] = Some(at);
         }
+
+        // nodes, whose matrices are taken apart where they are animated
         let transformed = animation::transformed(&doubles.animations);
         let mut taken_apart = Vec::new();
         let node = |p: &PlacedNode| {
@@ -96,6 +102,8 @@ impl<'a> RigBuilder<'a> {
         for node in taken_apart {
             warn(format!("node {node} is animated and has a matrix: taken apart into translation, rotation and scale"));
         }
+
+        // animations, and what they change
         let animations = animation::read(reader, &doubles.animations, &nodes, &index, warn);
         let (mut moves, mut morphs) = (vec![false; nodes.len()], vec![false; nodes.len()]);
         for channel in animations.iter().flat_map(|a| &a.channels).filter(|c| !c.is_constant(&nodes[c.node])) {
@@ -105,6 +113,7 @@ impl<'a> RigBuilder<'a> {
         for (at, node) in nodes.iter().enumerate() {
             moves[at] |= node.parent.is_some_and(|p| moves[p]);
         }
+
         Self {
             reader,
             doubles,
@@ -143,7 +152,8 @@ impl<'a> RigBuilder<'a> {
         Ok(MeshVariant { mesh, skin, weights })
     }
 
-    /// How a primitive deforms on placed node `at`, if it does. `triangles`: its vertices, in the file's order.
+    /// How a primitive deforms on placed node `at`, if it does. `triangles`: its vertices, in the
+    /// file's order.
     ///
     /// # Errors
     /// What is wrong, in words.
@@ -174,8 +184,8 @@ impl<'a> RigBuilder<'a> {
         Ok((made.skin.is_some() || !made.targets.is_empty()).then_some(made))
     }
 
-    /// Notes that mesh `mesh` of the scene deforms over time, or poses it here and now if it does not. Returns where it is to be placed
-    /// if it has a skin.
+    /// Notes that mesh `mesh` of the scene deforms over time, or poses it here and now if it does
+    /// not. Returns where it is to be placed if it has a skin.
     pub fn deform(
         &mut self,
         mut made: Deformation,
@@ -220,6 +230,7 @@ impl<'a> RigBuilder<'a> {
         if self.animations.is_empty() {
             return Ok(());
         }
+
         // only what carries something, with all above it
         let mut keep = vec![false; self.nodes.len()];
         let joints = self.deformations.iter().filter_map(|d| d.skin).flat_map(|s| &self.skins[&s].joints).copied();
@@ -234,6 +245,8 @@ impl<'a> RigBuilder<'a> {
                 keep[parent] = true;
             }
         }
+
+        // nodes that are kept are numbered anew, and so is what refers to them
         let mut next = 0;
         let count = |&keep: &bool| {
             next += usize::from(keep);
@@ -249,6 +262,7 @@ impl<'a> RigBuilder<'a> {
             animation.channels.retain(|c| keep[c.node]);
             animation.channels.iter_mut().for_each(|c| c.node = number[c.node]);
         }
+
         let mut skins = Vec::new();
         let mut names = BTreeMap::new();
         for deformation in &mut self.deformations {
@@ -262,6 +276,7 @@ impl<'a> RigBuilder<'a> {
                 })
             });
         }
+
         let renumber = |carried: Vec<Option<usize>>| carried.into_iter().map(|at| at.map(|at| number[at])).collect();
         let parts = RigParts {
             nodes: self.nodes,

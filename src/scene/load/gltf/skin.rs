@@ -56,7 +56,8 @@ pub(super) fn read(reader: &Reader, skin: &Skin, index: &[Option<usize>]) -> Res
     }
 }
 
-/// Joints and weights of each vertex, up to two sets; none if the primitive has none. `joints`: how many the skin has.
+/// Joints and weights of each vertex, up to two sets; none if the primitive has none. `joints`: how
+/// many the skin has.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -95,7 +96,8 @@ pub(super) fn influences(
     Ok(sets)
 }
 
-/// Morph targets, as many as `count`; those that the primitive lacks add nothing. `normals`: the primitive has some.
+/// Morph targets, as many as `count`; those that the primitive lacks add nothing. `normals`: the
+/// primitive has some.
 ///
 /// # Errors
 /// What is wrong, in words.

@@ -16,10 +16,12 @@ use crate::scene::load::options::{ImagesDecoded, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
-/// Decodes the images that materials use, and turns the glTF textures in their slots into the scene's.
+/// Decodes the images that materials use, and turns the glTF textures in their slots into the
+/// scene's.
 ///
-/// A texture whose image is missing or broken leaves its slot, with a warning: for every slot that is the same as a
-/// texture that changes nothing. So does every image if the options leave them out; their number is returned, too.
+/// A texture whose image is missing or broken leaves its slot, with a warning: for every slot that
+/// is the same as a texture that changes nothing. So does every image if the options leave them
+/// out; their number is returned, too.
 pub(super) fn resolve(
     reader: &Reader,
     path: &Path,
@@ -28,35 +30,40 @@ pub(super) fn resolve(
     warn: &mut dyn FnMut(String),
 ) -> (Vec<Texture>, usize) {
     let (document, options) = (reader.document, loading.options);
+
+    // textures that materials use, and the images that these need
     let mut used: BTreeMap<usize, Option<usize>> = BTreeMap::new();
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
         used.insert(slot.texture, None);
     }
-    // the crate's stand-in for a texture without a source, which is for extensions with other formats to give
+    // the crate's stand-in for a texture without a source, which is for extensions with other
+    // formats to give
     const NO_SOURCE: usize = u32::MAX as usize;
     let source_of = |texture: &json::Texture| Some(texture.source.value()).filter(|&s| s != NO_SOURCE);
     let image_of = |texture: usize| document.textures.get(texture).and_then(source_of);
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
+
     // several images may name one file: the first of them is decoded
     let mut first_of = BTreeMap::new();
     let content = |i: usize| document.images.get(i).map(|image| (image.uri.as_deref(), image.buffer_view.map(|v| v.value())));
     let same: BTreeMap<usize, usize> =
         wanted.iter().map(|&i| (i, content(i).map_or(i, |c| *first_of.entry(c).or_insert(i)))).collect();
     wanted.retain(|i| same[i] == *i);
+
+    // images in parallel
     let (count, done) = (wanted.len(), AtomicUsize::new(0));
     let decode = |i: usize| {
         let decoded = image(reader, path, loading, i);
         (options.progress)(ImagesDecoded { done: 1 + done.fetch_add(1, Ordering::Relaxed), of: Some(count) });
         (i, decoded)
     };
-    let decoded: BTreeMap<usize, Result<DecodedImage, String>> = match options.textures {
-        true => wanted.into_par_iter().map(decode).collect(),
-        false => BTreeMap::new(),
-    };
+    let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
+        if options.textures { wanted.into_par_iter().map(decode).collect() } else { BTreeMap::new() };
     let skipped = if options.textures { 0 } else { count };
 
+    // textures of the images that could be decoded
     for (i, error) in decoded.iter().filter_map(|(i, r)| Some((i, r.as_ref().err()?))) {
         warn(format!("image {i} {error}: shown without it"));
     }
@@ -85,6 +92,8 @@ pub(super) fn resolve(
             filter,
         });
     }
+
+    // materials refer to the new numbers; those of textures that are missing refer to none
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut) {
         if let Some(s) = slot {
             match used.get(&s.texture).copied().flatten() {
@@ -117,7 +126,8 @@ fn sampler(document: &Root, index: Option<Index<Sampler>>) -> ([Wrap; 2], Filter
         Some(WrappingMode::MirroredRepeat) => Wrap::Mirror,
         Some(WrappingMode::Repeat) | None => Wrap::Repeat,
     };
-    // without mip maps one filter serves both ways; magnification says more about what the author wants to see
+    // without mip maps one filter serves both ways; magnification says more about what the author
+    // wants to see
     let nearest = match sampler.mag_filter {
         Some(filter) => valid(filter) == Some(MagFilter::Nearest),
         None => matches!(

@@ -1,4 +1,5 @@
-//! URIs of buffers and images: data URIs, and relative paths with percent-encoding, also as exporters get them wrong.
+//! URIs of buffers and images: data URIs, and relative paths with percent-encoding, also as
+//! exporters get them wrong.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -9,15 +10,17 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
 use crate::scene::load::confine;
 
-/// What a URI stands for.
+/// Target of a URI.
 pub(super) enum Uri {
     /// The bytes of a data URI.
     Data(Vec<u8>),
-    /// Paths, relative to the glTF file unless absolute: the one that the URI means, then what else its writer may have meant.
+    /// Paths, relative to the glTF file unless absolute: the one that the URI means, then what else
+    /// its writer may have meant.
     Paths(Vec<PathBuf>),
 }
 
-/// Exporters disagree on padding, and on the bits beyond the last byte; the length says it all anyway.
+/// Exporters disagree on padding, and on the bits beyond the last byte; the length says it all
+/// anyway.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true),
@@ -66,12 +69,14 @@ pub(super) fn parse(uri: &str) -> Result<Uri, String> {
 /// The path of a `file:` URI after its scheme: `//host/path`, `/path` or `path`.
 fn file_path(rest: &str) -> &str {
     let Some(authority) = rest.strip_prefix("//") else { return rest };
-    // `file://a/b` is meant to be a relative path by whoever writes it into a glTF file, a machine of that name by the standard
+    // `file://a/b` is meant to be a relative path by whoever writes it into a glTF file, a machine
+    // of that name by the standard
     strip_prefix(authority, "localhost/").map_or(authority, |path| &authority[authority.len() - path.len() - 1..])
 }
 
-/// The paths that `uri` may mean, the likeliest first: escapes decoded and backslashes as slashes, without a query and a fragment; then, for files with such names, with fewer of
-/// these; an absolute path of another machine last, as a file name beside the glTF file.
+/// The paths that `uri` may mean, the likeliest first: escapes decoded and backslashes as slashes,
+/// without a query and a fragment; then, for files with such names, with fewer of these; an
+/// absolute path of another machine last, as a file name beside the glTF file.
 fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
     let decoded = String::from_utf8(percent_decode(uri.as_bytes()).into_owned()).map_err(|_| "has a URI that is not UTF-8")?;
     let slashes = decoded.replace('\\', "/");
@@ -95,8 +100,8 @@ fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
     Ok(paths)
 }
 
-/// The first of the paths that is a file in `folder`; the first of all if none is. `confine`: the folder without links that files have to lie below.
-/// `None` where a file elsewhere is meant.
+/// The first of the paths that is a file in `folder`; the first of all if none is. `confine`: the
+/// folder without links that files have to lie below. `None` where a file elsewhere is meant.
 pub(super) fn resolve(paths: &[PathBuf], folder: &Path, confine: Option<&Path>) -> Option<PathBuf> {
     if let Some(confine) = confine {
         let from = std::fs::canonicalize(folder.join(".")).ok()?;
@@ -112,7 +117,8 @@ pub(super) fn resolve(paths: &[PathBuf], folder: &Path, confine: Option<&Path>) 
     Some(found.or_else(|| joined.next()).unwrap_or_else(|| folder.to_owned()))
 }
 
-/// Base64 of the standard alphabet, without the line breaks of e-mails, of what may be of the alphabet for URLs.
+/// Base64 of the standard alphabet, without the line breaks of e-mails, of what may be of the
+/// alphabet for URLs.
 fn standard_base64(text: &[u8]) -> Cow<'_, [u8]> {
     if !text.iter().any(|b| b.is_ascii_whitespace() || matches!(b, b'-' | b'_')) {
         return text.into();

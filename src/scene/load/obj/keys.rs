@@ -4,14 +4,15 @@ use std::collections::HashMap;
 
 use super::parse::NONE;
 
-/// Longest chain. Few keys share a position as a rule; a file in which many do must not cost their square.
+/// Longest chain. Few keys share a position as a rule; a file in which many do must not cost their
+/// square.
 const MAX_CHAIN: usize = 8;
 
-/// Numbers the distinct keys at each position in the order in which they come, from 0. Those of a position form a chain, or
-/// are in a map where a chain would be long. The chains' heads are kept when it is cleared: a file of many small meshes
-/// must not reset them all.
+/// Numbers the distinct keys at each position in the order in which they come, from 0. Those of a
+/// position form a chain, or are in a map where a chain would be long. The chains' heads are kept
+/// when it is cleared: a file of many small meshes must not reset them all.
 pub(super) struct PositionKeys {
-    /// Of each position: the round that used it last, and its newest key then.
+    /// For each position the round that used it last, and its newest key then.
     heads: Vec<(u32, u32)>,
     round: u32,
     /// Keys with the one before at the same position.

@@ -14,7 +14,7 @@ use crate::scene::load::text::{self, unquoted, without_comment};
 use crate::scene::material::{AlphaMode, Material, MaterialKind};
 use crate::scene::settings::MtlDissolve;
 
-/// What faces without a (known) material look like: matte, a little darker than white.
+/// Material of faces without a (known) one: matte, a little darker than white.
 pub(super) fn grey(name: String) -> Material {
     Material { name, base_color: Vec4::new(0.8, 0.8, 0.8, 1.0), ..Material::default() }
 }
@@ -23,12 +23,13 @@ pub(super) fn grey(name: String) -> Material {
 pub(super) struct MaterialLibrary<'a> {
     /// Indices into [`Scene::materials`], by names as they are written.
     exact: HashMap<String, usize>,
-    /// The same by [`loose`] names.
+    /// Index of each material by its [`loose`] name.
     loose: HashMap<String, usize>,
     textures: Textures<'a>,
 }
 
-/// A name without what exporters disagree on: comments, quotation marks, white space and the case of letters.
+/// A name without what exporters disagree on: comments, quotation marks, white space and the case
+/// of letters.
 fn loose(name: &str) -> String {
     unquoted(without_comment(name)).split_ascii_whitespace().collect::<Vec<_>>().join(" ").to_ascii_lowercase()
 }
@@ -47,7 +48,8 @@ impl<'a> MaterialLibrary<'a> {
         self.textures.finder.find(names, &[obj])
     }
 
-    /// Fails if a name leads out of the folder that files have to lie below ([`LoadOptions::confine`]).
+    /// Fails if a name leads out of the folder that files have to lie below
+    /// ([`LoadOptions::confine`]).
     ///
     /// # Errors
     /// [`Error::Input`].
@@ -61,8 +63,8 @@ impl<'a> MaterialLibrary<'a> {
         exact.or_else(|| self.loose.get(&loose(name))).copied()
     }
 
-    /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`. What libraries before
-    /// it have defined stays.
+    /// Reads the library `mtl` of the model `obj` and appends its materials and textures to
+    /// `scene`. What libraries before it have defined stays.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
         let bytes = crate::files::read_regular(mtl).map_err(|e| Error::read(mtl, &e))?;
         if let Some(message) = crate::files::placeholder(&bytes).filter(|_| !bytes.is_empty()) {
@@ -152,7 +154,8 @@ impl<'a> MaterialLibrary<'a> {
         out
     }
 
-    /// The normal map: `norm`, or what is called a bump map and holds normals, as Blender writes it.
+    /// The normal map: `norm`, or what is called a bump map and holds normals, as Blender writes
+    /// it.
     fn normal_map(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
         let bump = m.map_bump.as_ref().filter(|_| m.map_normal.is_none());
         if let Some(bump) = bump {
@@ -208,8 +211,8 @@ fn vanishes(materials: &[MtlMaterial]) -> bool {
     !materials.is_empty() && materials.iter().all(is_hidden)
 }
 
-/// MTL says in several ways, none of them binding, that a material is glass or a mirror. `d` alone is none of them: it is
-/// coverage, and so is a `map_d`, which excludes glass.
+/// MTL says in several ways, none of them binding, that a material is glass or a mirror. `d` alone
+/// is none of them: it is coverage, and so is a `map_d`, which excludes glass.
 fn kind(m: &MtlMaterial, diffuse: Vec3, specular: Vec3) -> MaterialKind {
     let dark = diffuse.max_element() <= 0.05 && m.map_diffuse.is_none();
     match m.illum {
@@ -221,14 +224,14 @@ fn kind(m: &MtlMaterial, diffuse: Vec3, specular: Vec3) -> MaterialKind {
     }
 }
 
-/// Whether glass would be nothing at all: it does not refract and filters nothing. Maya writes so of every matte surface:
-/// `illum 4`, `Tf 1 1 1`, `Ni 1`.
+/// Whether glass would be nothing at all: it does not refract and filters nothing. Maya writes so
+/// of every matte surface: `illum 4`, `Tf 1 1 1`, `Ni 1`.
 fn is_unrefracting(m: &MtlMaterial) -> bool {
     m.ior == Some(1.0) && m.transmission_filter.is_none_or(|f| f == Vec3::ONE)
 }
 
-/// Whether `Tf` says that light goes through and `Ni` how it is refracted. 3ds Max writes both of every material, with `Tf`
-/// a copy of `d`: white for what is opaque.
+/// Whether `Tf` says that light goes through and `Ni` how it is refracted. 3ds Max writes both of
+/// every material, with `Tf` a copy of `d`: white for what is opaque.
 fn is_filter(m: &MtlMaterial) -> bool {
     let Some(filter) = m.transmission_filter.filter(|f| f.max_element() > 0.0) else { return false };
     let is_copy = |f: Vec3| (f - Vec3::splat(opacity(m))).abs().max_element() < 1e-3;

@@ -1,12 +1,13 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Read by a parser of our own, because no crate is fit for what users have; docs/formats.md has what tobj, the one that is
-//! kept best, reads of it. obj-rs names no line of an error, wavefront_obj refuses vertex colours and relative indices, and
-//! nobject-rs and wavefront take broken numbers without a word.
+//! Read by a parser of our own, because no crate is fit for what users have; docs/formats.md has
+//! what tobj, the one that is kept best, reads of it. obj-rs names no line of an error,
+//! wavefront_obj refuses vertex colours and relative indices, and nobject-rs and wavefront take
+//! broken numbers without a word.
 //!
-//! Each run of faces with one object or group name and one material becomes a mesh. Polygons are cut into fans, or by ear
-//! clipping where a fan would reach outside of them. Corners without `vn` are shaded smoothly in a smoothing group, and
-//! flat outside of one.
+//! Each run of faces with one object or group name and one material becomes a mesh. Polygons are
+//! cut into fans, or by ear clipping where a fan would reach outside of them. Corners without `vn`
+//! are shaded smoothly in a smoothing group, and flat outside of one.
 
 mod keys;
 mod material;
@@ -90,7 +91,8 @@ fn push(scene: &mut Scene, material: Material) -> usize {
     scene.materials.len() - 1
 }
 
-/// Reads the material libraries that a file names, or the one that is called as it is. Returns false if one is missing.
+/// Reads the material libraries that a file names, or the one that is called as it is. Returns
+/// false if one is missing.
 fn read_libraries(file: &ObjFile, path: &Path, materials: &mut MaterialLibrary, scene: &mut Scene) -> Result<bool> {
     // each once, however often it is named
     let (mut said, mut read) = (HashSet::new(), HashSet::new());
@@ -134,8 +136,8 @@ fn absolute(path: &Path) -> PathBuf {
 /// A library's name, and its file or where that was searched for.
 type FoundLibrary<'a> = (&'a str, Result<PathBuf, Vec<PathBuf>>);
 
-/// The libraries of a statement: one whose name may hold spaces, if there is such a file, or a list of names, of which some
-/// may hold spaces or be in quotation marks.
+/// The libraries of a statement: one whose name may hold spaces, if there is such a file, or a list
+/// of names, of which some may hold spaces or be in quotation marks.
 fn libraries<'a>(statement: &'a str, path: &Path, materials: &mut MaterialLibrary) -> Vec<FoundLibrary<'a>> {
     let list = without_comment(statement);
     let whole = materials.find(&[statement, list, unquoted(list)], path);
@@ -189,8 +191,9 @@ fn word_ranges(text: &str) -> Vec<(usize, usize)> {
     ranges
 }
 
-/// The point that meshes are relative to: zero, or the centre of a model that is far from its origin for its size, so that
-/// single precision is spent on the model. It is the same for all meshes: those that share a vertex still do.
+/// The point that meshes are relative to: zero, or the centre of a model that is far from its
+/// origin for its size, so that single precision is spent on the model. It is the same for all
+/// meshes: those that share a vertex still do.
 fn origin(file: &ObjFile) -> DVec3 {
     let used = file.groups.iter().flat_map(|g| g.triangles.iter().flatten()).map(|c| file.positions[c.position as usize]);
     let bounds = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));

@@ -10,7 +10,7 @@ use crate::scene::load::text::{self, trim, unquoted, without_comment};
 /// A texture map with its options.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map {
-    /// As written, a comment included: a name may hold ` #`.
+    /// Name of the file as written, a comment included: a name may hold ` #`.
     pub file: String,
     /// `-clamp on`.
     pub clamp: bool,
@@ -23,7 +23,7 @@ pub(super) struct Map {
 }
 
 impl Map {
-    /// What the file may be called.
+    /// Returns the names that the file may have.
     pub(super) fn names(&self) -> Vec<&str> {
         text::uncommented(&self.file).map(unquoted).collect()
     }
@@ -59,8 +59,8 @@ pub(super) struct MtlMaterial {
     pub parameters: BTreeMap<String, f32>,
 }
 
-/// Parses a library. Lines that make no sense are noted with their number and skipped: a broken material must not hide
-/// the model.
+/// Parses a library. Lines that make no sense are noted with their number and skipped: a broken
+/// material must not hide the model.
 pub(super) fn parse(source: &str, warn: &mut dyn FnMut(String)) -> Vec<MtlMaterial> {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     for (number, line) in text::lines(source).enumerate() {
@@ -81,6 +81,8 @@ pub(super) fn parse(source: &str, warn: &mut dyn FnMut(String)) -> Vec<MtlMateri
 
 fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), String> {
     let values = without_comment(rest);
+
+    // exporters write keys in any case
     match key.to_ascii_lowercase().as_str() {
         "kd" => material.diffuse = Some(color(values)?),
         "ks" => material.specular = Some(color(values)?),
@@ -121,7 +123,8 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
     Ok(())
 }
 
-/// What is said of a map that has no effect. The key is outside of quotation marks, so that each kind is said once.
+/// Says that a map has no effect. The key is outside of quotation marks, so that each kind is said
+/// once.
 pub(super) fn unused(key: &str) -> String {
     let key: String = key.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
     format!("{key} is not used")
@@ -137,9 +140,10 @@ fn number(text: &str) -> Result<f32, String> {
 
 /// The number of an illumination model: MTL has those from 0 to 10.
 fn model(number: f32) -> Result<u32, String> {
-    match number.fract() == 0.0 && (0.0..=10.0).contains(&number) {
-        true => Ok(number as u32),
-        false => Err(format!("`{number}` is no illumination model (0 to 10): ignored")),
+    if number.fract() == 0.0 && (0.0..=10.0).contains(&number) {
+        Ok(number as u32)
+    } else {
+        Err(format!("`{number}` is no illumination model (0 to 10): ignored"))
     }
 }
 
@@ -170,10 +174,13 @@ const OPTIONS: [(&str, usize); 13] = [
     ("-type", 1),
 ];
 
-/// `[-option values]... file name`, where the file name may hold spaces; some put options behind it.
+/// `[-option values]... file name`, where the file name may hold spaces; some put options behind
+/// it.
 fn map(text: &str) -> Result<Map, String> {
     let transform = Affine2::IDENTITY;
     let mut map = Map { file: String::new(), clamp: false, transform, multiplier: 1.0, range: [0.0, 1.0] };
+
+    // options stand before the name and behind it, which thus ends where one begins
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
     let mut rest = text;
     let mut name_end = None;
@@ -204,16 +211,18 @@ fn map(text: &str) -> Result<Map, String> {
             _ => {}
         }
     }
+
     if map.file.is_empty() {
         return Err(format!("`{}` names no file: ignored", text::shown(text)));
     }
-    // (u, v) -> scale * (u, v) + offset with v up; ours has v down on both sides: v' = 1 - (s (1 - v) + o)
+    // (u, v) -> scale * (u, v) + offset with v up; ours has v down on both sides:
+    // v' = 1 - (s (1 - v) + o)
     map.transform = Affine2::from_mat2_translation(Mat2::from_diagonal(scale), Vec2::new(offset.x, 1.0 - scale.y - offset.y));
     Ok(map)
 }
 
-/// The values of an option and what follows them, if it is one: how many numbers there are, and the numbers. `None` for
-/// part of a name.
+/// The values of an option and what follows them, if it is one: how many numbers there are, and the
+/// numbers. `None` for part of a name.
 fn option_values<'a>(option: &str, after: &'a str) -> Option<(usize, [f32; 3], &'a str)> {
     let (_, most) = OPTIONS.iter().find(|(name, _)| *name == option)?;
     let mut values = [0.0; 3];

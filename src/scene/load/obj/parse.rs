@@ -27,7 +27,8 @@ pub(super) struct Group {
     pub name: String,
     pub material: Option<String>,
     pub triangles: Vec<[Corner; 3]>,
-    /// Where a smoothing group begins: index of a triangle, and the group's number; 0 for none, and before the first.
+    /// Where a smoothing group begins: index of a triangle, and the group's number; 0 for none, and
+    /// before the first.
     pub smoothing: Vec<(u32, u32)>,
 }
 
@@ -143,7 +144,8 @@ impl Parser {
         Ok(())
     }
 
-    /// Up to three numbers, of which the first `needed` must be there; the others are zero if missing.
+    /// Up to three numbers, of which the first `needed` must be there; the others are zero if
+    /// missing.
     fn floats<T: Number>(&mut self, words: &mut SplitAsciiWhitespace, needed: usize) -> Result<[T; 3], String> {
         let mut out = [T::default(); 3];
         for (i, value) in out.iter_mut().enumerate() {
@@ -249,7 +251,8 @@ impl Number for f64 {
     }
 }
 
-/// A number as programs write it: with a decimal comma, with Fortran's exponent, or as Windows writes what is none.
+/// A number as programs write it: with a decimal comma, with Fortran's exponent, or as Windows
+/// writes what is none.
 pub(super) fn float(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| {
         let number = word.replacen(',', ".", 1).replacen(['d', 'D'], "e", 1);
@@ -258,7 +261,8 @@ pub(super) fn float(word: &str) -> Option<f64> {
     })
 }
 
-/// The number of a smoothing group; 0 for `off`. Numbers are names: those that do not fit into 32 bits are told apart as far as they can be.
+/// The number of a smoothing group; 0 for `off`. Numbers are names: those that do not fit into 32
+/// bits are told apart as far as they can be.
 fn smoothing_group(rest: &str) -> u32 {
     let word = words(rest).next().unwrap_or("off");
     match word.parse::<f64>() {

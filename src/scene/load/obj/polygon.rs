@@ -3,7 +3,8 @@
 use earcut::Earcut;
 use glam::DVec3;
 
-/// Most corners of a polygon that is cut. Of one that crosses itself cutting costs the square of its corners: a second for so many.
+/// Most corners of a polygon that is cut. Of one that crosses itself cutting costs the square of
+/// its corners: a second for so many.
 pub(super) const MAX_CORNERS: usize = 10_000;
 
 /// Cuts concave polygons; keeps its buffers from one to the next.
@@ -15,9 +16,10 @@ pub(super) struct PolygonTriangulator {
 }
 
 impl PolygonTriangulator {
-    /// The triangles of a polygon of finite corners that no fan from its first corner can fill, as indices of corners and
-    /// with the polygon's orientation. `None` where the fan is right, or nothing is: the polygon is a triangle, convex, a
-    /// quad whose fan starts at the dent, has no area, or more than [`MAX_CORNERS`].
+    /// The triangles of a polygon of finite corners that no fan from its first corner can fill, as
+    /// indices of corners and with the polygon's orientation. `None` where the fan is right, or
+    /// nothing is: the polygon is a triangle, convex, a quad whose fan starts at the dent, has no
+    /// area, or more than [`MAX_CORNERS`].
     pub(super) fn cut(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<impl Iterator<Item = [usize; 3]>> {
         self.project(corners)?;
         if self.points.len() > MAX_CORNERS {
@@ -38,8 +40,8 @@ impl PolygonTriangulator {
         })
     }
 
-    /// Drops the axis along which the polygon's normal (by Newell's method) is longest, so that the polygon turns
-    /// counter-clockwise. `None` for triangles, and if there is no normal.
+    /// Drops the axis along which the polygon's normal (by Newell's method) is longest, so that the
+    /// polygon turns counter-clockwise. `None` for triangles, and if there is no normal.
     fn project(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<()> {
         // relative to a corner, so that no digits are lost far from the origin
         let origin = corners.clone().next()?;

@@ -5,9 +5,9 @@ use glam::{DVec3, Vec3};
 use super::keys::PositionKeys;
 use super::parse::{Corner, Group, NONE, ObjFile};
 
-/// Gives the corners without a normal in smoothing groups the mean of the normals of the triangles of their group around
-/// their position, weighted by angle, in whichever meshes they are. The other triangles of their meshes are flat. Returns
-/// the number of meshes that got normals.
+/// Gives the corners without a normal in smoothing groups the mean of the normals of the triangles
+/// of their group around their position, weighted by angle, in whichever meshes they are. The other
+/// triangles of their meshes are flat. Returns the number of meshes that got normals.
 pub(super) fn smooth(file: &mut ObjFile) -> usize {
     let lacks = |t: &[Corner; 3]| t.iter().any(|c| c.normal == NONE);
     let is_smoothed = |g: &Group| runs(g).any(|(from, to, number)| number > 0 && g.triangles[from..to].iter().any(lacks));

@@ -12,18 +12,20 @@ use crate::scene::load::text;
 use crate::scene::material::TextureSlot;
 use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
 
-/// What texels of a texture are made of, so that no two textures are alike.
+/// Source of a texture's texels, so that no two textures are alike.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Texels {
     /// Colour of the first map, alpha of the second.
     ColorAndAlpha,
     /// Roughness of the first map (green), metalness of the second (blue).
     Surface,
-    /// The same, with Blinn-Phong exponents in the first map: bits of the largest one.
+    /// A surface's roughness and metalness, with Blinn-Phong exponents in the first map: bits of
+    /// the largest one.
     SurfaceOfExponents(u32),
 }
 
-/// What identifies a texture: its texels, its files with the bits of their `-mm`, and whether it is clamped.
+/// Identity of a texture: its texels, its files with the bits of their `-mm`, and whether it is
+/// clamped.
 type TextureKey = (Texels, [Option<(PathBuf, [u32; 2])>; 2], bool);
 
 /// The pictures and textures of a model's materials.
@@ -43,7 +45,8 @@ impl<'a> Textures<'a> {
         Self { loading, finder: Finder::new(&loading.options), pictures, textures, missing: HashSet::new() }
     }
 
-    /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can be read.
+    /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can
+    /// be read.
     pub(super) fn color(
         &mut self,
         color: Option<&Map>,
@@ -69,7 +72,8 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The texture of roughness and metalness. `shininess`: the first map holds shares of this Blinn-Phong exponent.
+    /// The texture of roughness and metalness. `shininess`: the first map holds shares of this
+    /// Blinn-Phong exponent.
     pub(super) fn surface(
         &mut self,
         [rough, metal]: [Option<&Map>; 2],
@@ -80,12 +84,12 @@ impl<'a> Textures<'a> {
         let texels = shininess.map_or(Texels::Surface, |n| Texels::SurfaceOfExponents(n.to_bits()));
         self.slot([rough, metal], texels, beside, scene, |[rough, metal]| {
             combined([rough, metal].map(|p| p.map(|(_, picture)| picture)), |[r, m]| {
-                let of = |texel: Option<[f32; 4]>, p: Option<(&Map, &DecodedImage)>| {
+                let channel = |texel: Option<[f32; 4]>, p: Option<(&Map, &DecodedImage)>| {
                     texel.zip(p).map_or(1.0, |(texel, (map, _))| ranged(map, texel[0]))
                 };
-                let rough = of(r, rough);
+                let rough = channel(r, rough);
                 let rough = shininess.filter(|_| r.is_some()).map_or(rough, |n| roughness(n * rough));
-                [1.0, rough, of(m, metal), 1.0]
+                [1.0, rough, channel(m, metal), 1.0]
             })
         })
     }
@@ -186,7 +190,8 @@ fn has_alpha(picture: &DecodedImage) -> bool {
     picture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0)
 }
 
-/// Whether alpha is a matter of yes or no: at most a tenth of the texels, those along edges, are between.
+/// Whether alpha is a matter of yes or no: at most a tenth of the texels, those along edges, are
+/// between.
 pub(super) fn is_cut_out(texels: &TexelData) -> bool {
     let (between, all) = texels
         .iter()
@@ -207,7 +212,8 @@ pub(super) fn is_normal_map(texels: &TexelData) -> bool {
     length_error < 0.15 * count && outwards > 0.4 * count && spread > 0.1 * count
 }
 
-/// A picture of the size of the larger one, each of whose texels `f` makes of those at the same place.
+/// A picture of the size of the larger one, each of whose texels `f` makes of those at the same
+/// place.
 fn combined(pictures: [Option<&DecodedImage>; 2], f: impl Fn([Option<[f32; 4]>; 2]) -> [f32; 4]) -> DecodedImage {
     let size = |side: fn(&DecodedImage) -> u32| pictures.iter().flatten().map(|p| side(p)).max().unwrap_or(1);
     let (width, height) = (size(|p| p.width), size(|p| p.height));
@@ -219,10 +225,10 @@ fn combined(pictures: [Option<&DecodedImage>; 2], f: impl Fn([Option<[f32; 4]>; 
     let all = (0..height)
         .flat_map(|y| (0..width).map(move |x| (x, y)))
         .flat_map(|(x, y)| f(pictures.map(|p| p.map(|p| texel(p, x, y)))));
-    let of = |kind: fn(&TexelData) -> bool| pictures.iter().flatten().map(move |p| kind(&p.texels));
-    let texels = if of(|t| matches!(t, TexelData::Float(_))).any(|is| is) {
+    let formats = |kind: fn(&TexelData) -> bool| pictures.iter().flatten().map(move |p| kind(&p.texels));
+    let texels = if formats(|t| matches!(t, TexelData::Float(_))).any(|is| is) {
         all.collect::<Vec<f32>>().into()
-    } else if of(|t| matches!(t, TexelData::Unorm8(_))).all(|is| is) {
+    } else if formats(|t| matches!(t, TexelData::Unorm8(_))).all(|is| is) {
         all.map(|v| (v * 255.0).round() as u8).collect::<Vec<u8>>().into()
     } else {
         all.map(|v| (v * 65535.0).round() as u16).collect::<Vec<u16>>().into()
