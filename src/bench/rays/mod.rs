@@ -132,7 +132,7 @@ fn add_scaling(session: &mut RaySession) -> Result<()> {
     let keys = chart::distinct(rates.iter().map(|(key, _)| key));
     for key in &keys {
         let points: Vec<(u64, f64)> = rates.iter().filter(|(k, _)| k == *key).map(|(_, p)| *p).collect();
-        let Some(law) = LogScaling::of(&points) else { continue };
+        let Some(law) = LogScaling::from_points(&points) else { continue };
         let (family, stream, contestant) = key;
         let mut row = session.record.row(family, &format!("{stream} by size"), contestant);
         row.exact(plain("falls as n to the power", ""), law.exponent);
