@@ -170,7 +170,7 @@ fn escaped(json: &str) -> String {
     for c in json.chars() {
         if is_obeyed(c) {
             // writing to a string does not fail
-            drop(write!(out, "\\u{:04x}", u32::from(c)));
+            let _ = write!(out, "\\u{:04x}", u32::from(c));
         } else {
             out.push(c);
         }
