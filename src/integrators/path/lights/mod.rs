@@ -6,6 +6,7 @@
 //! What is chosen by irradiance may be hidden where another light is not, so that each choice leaves a share to all: no light is sampled so rarely that few
 //! samples do not tell of it.
 
+mod collect;
 pub(super) mod device;
 mod pictures;
 mod portals;
@@ -16,17 +17,19 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::Vec3;
 
-use super::light_tree::{self, Bounds};
+use super::light_tree;
 use super::params::INVALID;
-use crate::accel::features::{AlphaClass, alpha_classes};
+use crate::accel::features::alpha_classes;
 use crate::accel::flatten::FlatScene;
 use crate::interface::records::lights::{LightNode, LightRecord};
 use crate::interface::{LightKind as Kind, LightKinds};
 use crate::sampling::CumulativeTable;
 use crate::scene::lights::Emission;
 use crate::scene::{Geometry, Light, Scene};
+use collect::LightCollector;
+pub(super) use collect::{LightBuilder, brightness};
 
 /// Fraction of the samples of distant lights that go to the environment and to directional lights in equal parts, and to each of these in equal parts,
 /// whatever irradiance they bring.
@@ -54,56 +57,6 @@ pub(super) struct Lights {
     pub directional: Range<u32>,
     /// Some directional lights have an angular diameter above 0, so that rays can hit them.
     pub has_disks: bool,
-}
-
-/// Importance of a light of this radiance (or intensity, or irradiance; linear RGB): the root mean square of its channels. Sampling in proportion to it minimizes
-/// the squared error summed over channels; in proportion to luminance, blue lights would be undersampled and noisy.
-pub(super) fn brightness(c: Vec3) -> f64 {
-    (c.as_dvec3().length_squared() / 3.0).sqrt()
-}
-
-/// Makes the lights of a scene, again and again if they move: what does not depend on where they are is found once.
-pub(super) struct LightBuilder {
-    origin: DVec3,
-    /// Radiance of what surrounds the scene, averaged over the sphere.
-    environment: Vec3,
-    alpha: Vec<AlphaClass>,
-    /// For each instance: it moves or deforms.
-    moves: Vec<bool>,
-    /// Means of the textures of emitters, by index.
-    means: HashMap<Option<usize>, Vec4>,
-}
-
-/// Collects lights: placed ones with their bounds, then distant ones with the weights by which they are chosen.
-#[derive(Default)]
-struct LightCollector {
-    records: Vec<LightRecord>,
-    bounds: Vec<Bounds>,
-    weights: Vec<f64>,
-}
-
-impl LightCollector {
-    /// Adds a placed light and returns its index. A light that emits nothing is not sampled: [`INVALID`].
-    fn push_placed(&mut self, record: LightRecord, bounds: Bounds) -> u32 {
-        debug_assert!(self.weights.is_empty(), "placed lights come first");
-        if bounds.intensity.is_nan() || bounds.intensity <= 0.0 {
-            return INVALID;
-        }
-        self.records.push(LightRecord { probability: 1.0, ..record });
-        self.bounds.push(bounds);
-        self.records.len() as u32 - 1
-    }
-
-    /// Adds a distant light and returns its index. `weight`: irradiance that it brings, by which it is chosen among its like. Without any it is not sampled:
-    /// [`INVALID`].
-    fn push_distant(&mut self, record: LightRecord, weight: f64) -> u32 {
-        if weight.is_nan() || weight <= 0.0 {
-            return INVALID;
-        }
-        self.records.push(record);
-        self.weights.push(weight);
-        self.records.len() as u32 - 1
-    }
 }
 
 impl Lights {
@@ -214,7 +167,6 @@ fn distant_probabilities(weights: &[f64], directional: usize, sky: f64) -> Vec<f
 mod tests {
     use super::*;
 
-    /// The importance of a light does not depend on the channel of its radiance.
     #[test]
     fn no_distant_light_is_left_out() {
         // one sun, 1e6 times as bright as the other, and a sky of 1e-6 of it
@@ -225,13 +177,5 @@ mod tests {
         // portals share what the environment gets
         assert_eq!(distant_probabilities(&[1.0, 3.0], 0, 7.0), [0.25, 0.75]);
         assert!(distant_probabilities(&[], 0, 0.0).is_empty());
-    }
-
-    #[test]
-    fn colours_count_alike() {
-        let colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
-        let counts = colours.map(brightness);
-        assert!(counts[0] == counts[1] && counts[1] == counts[2] && (counts[3] - 1.0).abs() < 1e-12, "{counts:?}");
-        assert_eq!(brightness(3.0 * Vec3::Z), 3.0 * counts[2]);
     }
 }
