@@ -33,17 +33,20 @@ pub fn render(scene: &str, image: &Path) -> skylit::Result<f64> {
     let camera = CameraRecord::new(&scene.cameras[0], flat.origin, aspect);
     let pixels = aov::render(&tracer, &camera, SIZE, &mut NoControl)?;
 
-    // a ray from each point to each place of the sun above its surface; it starts off the surface
+    // a ray from each point to each place of the sun above its surface; it starts off the surface,
+    // on the side that the camera sees
+    let eye = (scene.cameras[0].camera_to_world.translation - flat.origin).as_vec3();
     let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let offset = 1e-4 * (high - low).length() as f32;
     let (mut rays, mut pixel_of_ray) = (Vec::new(), Vec::new());
     for (k, pixel) in pixels.iter().enumerate().filter(|(_, pixel)| pixel.depth.is_finite()) {
-        let normal = Vec3::from(pixel.ng);
+        let (position, normal) = (Vec3::from(pixel.position), Vec3::from(pixel.ng));
+        let normal = if normal.dot(eye - position) < 0.0 { -normal } else { normal };
         for hour in 0..HOURS {
             let angle = std::f32::consts::PI * (hour as f32 + 0.5) / HOURS as f32;
             let to_sun = Vec3::new(angle.cos(), angle.sin(), 0.4).normalize();
             if normal.dot(to_sun) > 0.0 {
-                let origin = (Vec3::from(pixel.position) + offset * normal).to_array();
+                let origin = (position + offset * normal).to_array();
                 rays.push(Ray { origin, tmin: 0.0, direction: to_sun.to_array(), tmax: f32::INFINITY });
                 pixel_of_ray.push(k);
             }

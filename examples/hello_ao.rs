@@ -6,7 +6,8 @@ use skylit::film::NoControl;
 use skylit::renderer::{RenderSettings, Renderer};
 use skylit::tracer::DeviceSettings;
 
-/// Renders a scene file or built-in scene, and returns its mean ambient visibility, from 0 to 1.
+/// Renders a scene file or built-in scene, and returns the mean ambient visibility of its surfaces,
+/// from 0 to 1.
 pub fn render(scene: &str, image: &Path) -> skylit::Result<f64> {
     let mut renderer = Renderer::open(scene, &DeviceSettings::default())?;
     let mut settings = RenderSettings::default();
@@ -14,7 +15,7 @@ pub fn render(scene: &str, image: &Path) -> skylit::Result<f64> {
     settings.image.spp = Some(16);
     let still = renderer.still(&settings, &mut NoControl)?;
     still.save(image)?;
-    Ok(still.report.mean)
+    Ok(still.report.surface_mean.unwrap_or(0.0))
 }
 
 fn main() -> skylit::Result<()> {

@@ -1,4 +1,5 @@
-//! Images as they are displayed, by which they are compared: lamps and the sun, hundreds of times as bright as all else, would be all that an error of radiance says.
+//! Images as they are displayed, by which they are compared: lamps and the sun, hundreds of times
+//! as bright as all else, would be all that an error of radiance says.
 
 use super::flip::{PIXELS_PER_DEGREE, flip};
 use super::metrics::ImagePair;
@@ -16,7 +17,8 @@ pub struct Displayed {
 }
 
 impl Displayed {
-    /// Converts ambient visibility (1 channel), which is compared as it is, or radiance (3). What is not finite stays so: broken pixels must not be averaged away.
+    /// Converts ambient visibility (1 channel), which is compared as it is, or radiance (3). What
+    /// is not finite stays so: broken pixels must not be averaged away.
     pub fn new(values: &[f32], channels: usize) -> Self {
         if channels == 1 {
             let linear: Vec<f32> = values.iter().map(|v| v.clamp(0.0, 1.0)).collect();
@@ -39,7 +41,8 @@ pub struct ImageErrors {
     pub rmse: f64,
     /// Without the reference's: `sqrt(max(0, rmse^2 - reference^2))`.
     pub corrected: f64,
-    /// Mean of image - reference, of ambient visibility; of radiance, of linear values as displayed, over the mean of the reference.
+    /// Mean of image - reference, of ambient visibility; of radiance, of linear values as
+    /// displayed, over the mean of the reference.
     pub bias: f64,
     /// How different they look, 0 to 1.
     pub flip: f64,
@@ -65,7 +68,8 @@ impl ImageErrors {
         })
     }
 
-    /// Error over that of plain accumulation. `None` where the references' own errors are all there is.
+    /// Error over that of plain accumulation. `None` where the references' own errors are all there
+    /// is.
     pub fn over(&self, plain: &Self) -> Option<f64> {
         (plain.corrected > 0.0).then(|| self.corrected / plain.corrected)
     }
@@ -85,7 +89,8 @@ pub struct FrameReference {
 }
 
 impl FrameReference {
-    /// The mean of two independent halves; errors are over the pixels whose `mask` is above 0 (`None`: all).
+    /// The mean of two independent halves; errors are over the pixels whose `mask` is above 0
+    /// (`None`: all).
     pub fn new(halves: [&[f32]; 2], channels: usize, width: usize, mask: Option<Vec<f32>>) -> Result<Self> {
         let [a, b] = halves.map(|half| Displayed::new(half, channels));
         let rmse = 0.5 * ImagePair::new(&a.coded, &b.coded, channels, mask.as_deref())?.rmse();
@@ -135,7 +140,8 @@ impl Flicker {
     /// A step of an 8-bit image.
     pub const LIMIT: f64 = 1.0 / 255.0;
 
-    /// Is it less than a step of an 8-bit image, in each pair of frames? `None` of a run that was too short to tell.
+    /// Is it less than a step of an 8-bit image, in each pair of frames? `None` of a run that was
+    /// too short to tell.
     pub fn is_invisible(&self) -> Option<bool> {
         (self.after >= Self::SETTLED).then_some(self.greatest < Self::LIMIT)
     }
@@ -169,7 +175,7 @@ impl FlickerMeter {
         Ok(())
     }
 
-    /// What was found; `None` for too few frames.
+    /// The results; `None` for too few frames.
     pub fn result(&self) -> Option<Flicker> {
         let squares: f64 = self.pairs.iter().map(|p| p * p).sum();
         let greatest = self.pairs.iter().fold(0.0, |most: f64, p| if p.is_nan() { f64::NAN } else { most.max(*p) });
@@ -178,8 +184,8 @@ impl FlickerMeter {
     }
 }
 
-/// The root of a mean squared error without the error of the reference that it was measured against, which is independent of it; 0 where nothing is left. NaN
-/// stays what it is.
+/// The root of a mean squared error without the error of the reference that it was measured
+/// against, which is independent of it; 0 where nothing is left. NaN stays what it is.
 pub fn without_reference(rmse: f64, reference_rmse: f64) -> f64 {
     let squares = rmse * rmse - reference_rmse * reference_rmse;
     if squares < 0.0 { 0.0 } else { squares.sqrt() }

@@ -1,21 +1,24 @@
-//! What images of independent samples take: a time for the image, and one for each path.
+//! The time that images of independent samples take: one for the image, and one for each path.
 
 use super::stats::median;
 
 /// Times of plain accumulation that are taken between frames.
 const TIMES_BETWEEN: usize = 4;
 
-/// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
+/// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is
+/// told by two numbers of them.
 pub const TIMED_PATHS: [u32; 2] = [1, 9];
 
-/// Times of images of independent samples. They are taken between the frames that they are compared with: a machine that slows down for a while slows both down.
+/// Times of images of independent samples. They are taken between the frames that they are compared
+/// with: a machine that slows down for a while slows both down.
 #[derive(Clone, Debug, Default)]
 pub struct PlainClock {
     seconds: [Vec<f64>; 2],
 }
 
 impl PlainClock {
-    /// Takes the times of an image of few and one of many paths. `image` renders one, and returns its seconds.
+    /// Takes the times of an image of few and one of many paths. `image` renders one, and returns
+    /// its seconds.
     pub fn take<E>(&mut self, mut image: impl FnMut(u32) -> Result<f64, E>) -> Result<(), E> {
         for (seconds, paths) in self.seconds.iter_mut().zip(TIMED_PATHS) {
             seconds.push(image(paths)?);
@@ -33,14 +36,15 @@ impl PlainClock {
 /// Time of images of independent samples, milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlainTime {
-    /// Of an image, besides its paths.
+    /// Time of an image, besides its paths.
     pub per_image: f64,
-    /// Of each path per pixel.
+    /// Time of each path per pixel.
     pub per_path: f64,
 }
 
 impl PlainTime {
-    /// Of images that took `ms` for so many paths: a line through two points, neither part of which is negative.
+    /// The times of images that took `ms` for so many paths: a line through two points, neither part of which
+    /// is negative.
     fn through([few, many]: [u32; 2], [least, most]: [f64; 2]) -> Self {
         let per_path = ((most - least) / f64::from(many - few)).clamp(0.0, most / f64::from(many));
         // times have noise: paths are not free
@@ -54,7 +58,8 @@ impl PlainTime {
     }
 }
 
-/// Is the time of plain accumulation taken after a frame, counted from 0, of so many whose time counts from `first` on?
+/// Is the time of plain accumulation taken after a frame, counted from 0, of so many whose time
+/// counts from `first` on?
 pub fn is_plain_timed(frame: u32, first: usize, frames: u32) -> bool {
     let step = (frames as usize - first).div_ceil(TIMES_BETWEEN);
     (frame as usize).checked_sub(first).is_some_and(|n| n.is_multiple_of(step.max(1)))

@@ -4,23 +4,25 @@ use serde::{Deserialize, Serialize};
 
 use super::stats::{Percentiles, number_or_nan};
 
-/// Least change that counts, as a share of the baseline: builds that differ in nothing but the addresses of their code differ by a few per cent.
+/// Least change that counts, as a share of the baseline: builds that differ in nothing but the
+/// addresses of their code differ by a few per cent.
 const MIN_CHANGE: f64 = 0.05;
-/// Standard errors that chance is given: a run has hundreds of results, and none of them should be called worse by chance.
+/// Standard errors that chance is given: a run has hundreds of results, and none of them should be
+/// called worse by chance.
 const STANDARD_ERRORS: f64 = 4.0;
 
 /// The rule in a sentence.
 pub const RULE: &str = "A median counts as changed if it differs from the baseline's by more than 5 % and by more than 4 standard errors of the difference (from the \
                         quartiles of the repeats), and if the interquartile ranges of both runs do not overlap; what has no noise counts from 5 % on.";
 
-/// What is said of a result.
+/// The verdict on a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judgement {
     /// Worse beyond noise.
     Worse,
     /// Better beyond noise.
     Better,
-    /// What noise explains.
+    /// The difference that noise explains.
     Same,
     /// There are too few repeats to know the noise.
     Unknown,
@@ -32,7 +34,8 @@ pub enum Judgement {
 pub enum Values {
     /// Repeated measurements, which have noise.
     Repeated(Percentiles),
-    /// What is the same in every run on the same device. JSON has null for a number that is not finite.
+    /// A value that is the same in every run on the same device. JSON has null for a number that is
+    /// not finite.
     Exact(#[serde(deserialize_with = "number_or_nan")] f64),
 }
 
@@ -62,7 +65,7 @@ impl Values {
 /// A result beside an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// What is said of it.
+    /// The verdict on the result.
     pub judgement: Judgement,
     /// How much worse it is, as a share of the earlier one; negative where it is better.
     pub worse_by: f64,
@@ -97,7 +100,7 @@ pub fn judge(before: &Values, now: &Values, more_is_better: bool) -> Judged {
     Judged { judgement, worse_by: share(worse), noise: noise.map_or(f64::NAN, share) }
 }
 
-/// What chance makes of the difference; `None` where that is unknown.
+/// The difference that chance makes; `None` where that is unknown.
 fn noise(before: &Values, now: &Values) -> Option<f64> {
     match (before, now) {
         (Values::Repeated(a), Values::Repeated(b)) => Some(STANDARD_ERRORS * a.standard_error()?.hypot(b.standard_error()?)),
@@ -162,7 +165,8 @@ mod tests {
         assert_eq!(judgement(old, repeated(&[2.0, 2.0, 2.0])), Judgement::Unknown);
     }
 
-    /// Two runs of the same program whose times have a deviation of a tenth: how often is one called worse?
+    /// Two runs of the same program whose times have a deviation of a tenth: how often is one
+    /// called worse?
     #[test]
     fn false_alarms_are_rare() {
         let mut state = 1u64;

@@ -4,7 +4,7 @@
 const SIGMAS: f64 = 5.0;
 /// Half side of the squares over which deviations are pooled, pixels.
 const POOL: i64 = 2;
-/// What an 8-bit image does not show counts as noise.
+/// A difference that an 8-bit image does not show counts as noise.
 const HALF_STEP: f64 = 1.0 / 510.0;
 
 /// Images of runs that never saw the old: what chance does to a pixel.
@@ -31,8 +31,9 @@ impl FreshImages {
         self.count += 1;
     }
 
-    /// Number of pixels of an image that are off from the mean of these towards `old`, where that differs from `reference`, beyond five standard deviations. Only pixels whose `mask` is above 0
-    /// count.
+    /// Number of pixels of an image that are off from the mean of these towards `old`, where that
+    /// differs from `reference`, beyond five standard deviations. Only pixels whose `mask` is above
+    /// 0 count.
     pub fn stale_pixels(&self, image: &[f32], mask: &[f32], [reference, old]: [&[f32]; 2]) -> u64 {
         let runs = self.count as f64;
         let moments = self.sums.iter().zip(&self.squares);

@@ -135,8 +135,8 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Linear colour and alpha at a point, interpolated by the texture's filter; its texels must not be empty.
-    /// `uv`: any texture coordinates, v down. The texels are sRGB.
+    /// Linear colour and alpha at a point, interpolated by the texture's filter; its texels must
+    /// not be empty. `uv`: any texture coordinates, v down. The texels are sRGB.
     pub fn look_up_srgb(&self, uv: Vec2) -> Vec4 {
         let texel = |i: i64, j: i64| Vec4::from_array(self.texels.decode_srgb(self.texel_index(i, j)));
         // the casts saturate; NaN becomes 0
@@ -154,7 +154,8 @@ impl Texture {
         row(j).lerp(row(next_j), t.y)
     }
 
-    /// Index of the texel in column `i` and row `j`, which may lie outside the image: they are wrapped.
+    /// Index of the texel in column `i` and row `j`, which may lie outside the image: they are
+    /// wrapped.
     fn texel_index(&self, i: i64, j: i64) -> usize {
         let inside = |i: i64, size: u32, wrap: Wrap| {
             let n = i64::from(size.max(1));

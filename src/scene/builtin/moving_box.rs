@@ -14,7 +14,8 @@ const FOV_Y: f64 = 45.0;
 /// Where the box stands, and where it is out of sight and of reach.
 const HERE: DVec3 = DVec3::new(0.3, 0.0, 0.4);
 const AWAY: DVec3 = DVec3::new(0.3, 12.0, 0.4);
-/// Everything is turned by so much, radians: the pipeline of the reference work has no directions about a normal along z.
+/// Everything is turned by so much, radians: the pipeline of the reference work has no directions
+/// about a normal along z.
 const TURN: f64 = 0.5;
 /// Share of the view's width that the sliding box goes in a frame.
 const SLIDE: f64 = 0.02;
@@ -59,7 +60,8 @@ impl Mover {
         (self.instance, placed(HERE))
     }
 
-    /// Where it is in a frame in which it slides to and fro, always by the same share of the view's width.
+    /// Where it is in a frame in which it slides to and fro, always by the same share of the view's
+    /// width.
     pub fn sliding(self, frame: u32, aspect: f64) -> (usize, DAffine3) {
         let half_height = (0.5 * FOV_Y.to_radians()).tan() * EYE.distance(HERE);
         let step = SLIDE * 2.0 * half_height * aspect;
@@ -75,7 +77,8 @@ fn placed(at: DVec3) -> DAffine3 {
     DAffine3::from_rotation_y(TURN) * DAffine3::from_translation(at)
 }
 
-/// 0, 1, ... up to [`SLIDE_FRAMES`], down to its negative and up again: never the same twice in a row.
+/// 0, 1, ... up to [`SLIDE_FRAMES`], down to its negative and up again: never the same twice in a
+/// row.
 fn wave(frame: u32) -> i32 {
     let (most, period) = (SLIDE_FRAMES as i32, 4 * SLIDE_FRAMES);
     let at = (frame % period) as i32;

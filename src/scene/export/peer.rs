@@ -26,13 +26,16 @@ impl Files<'_> {
     }
 }
 
-/// Writes a scene for programs that benchmarks run beside ours: `scene.json` in a folder, and a file for each of its arrays. docs/benchmarks.md has the format.
+/// Writes a scene for programs that benchmarks run beside ours: `scene.json` in a folder, and a
+/// file for each of its arrays. docs/benchmarks.md has the format.
 ///
 /// # Errors
 /// [`Error::Output`]; [`Error::Scene`] for a light that the format does not have.
 pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
     let mut files = Files { folder, count: 0 };
+
+    // geometry in world space: peers need no instances
     let (mut meshes, mut spheres) = (Vec::new(), Vec::new());
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
@@ -70,6 +73,8 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
             }
         }
     }
+
+    // what surfaces and the surroundings look like
     let textures = scene.textures.iter().map(|t| {
         Ok(json!({
             // the peers' own format of 8 bits
@@ -92,6 +97,8 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
             "to_map": map.to_map.transpose().to_cols_array(),
         }),
     };
+
+    // lights and the camera
     let lights: Vec<Value> = scene
         .lights
         .iter()
@@ -113,6 +120,8 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
         Projection::Perspective { fov_y } => (Some(fov_y), None),
         Projection::Orthographic { half_height } => (None, Some(half_height)),
     };
+
+    // all of it into one file, which names the others
     let m = camera.camera_to_world;
     let text = json!({
         "size": size,

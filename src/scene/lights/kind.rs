@@ -1,4 +1,4 @@
-//! What a type of light declares, and a light of it.
+//! Declarations of types of lights, and lights of these types.
 
 use glam::DVec3;
 

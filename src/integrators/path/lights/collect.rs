@@ -1,5 +1,5 @@
-//! What lights are collected with: how bright one is, what does not change while they move, and the lists to which each
-//! kind adds its own.
+//! What lights are collected with: how bright one is, what does not change while they move, and the
+//! lists to which each kind adds its own.
 
 use std::collections::HashMap;
 
@@ -10,13 +10,15 @@ use super::super::params::INVALID;
 use crate::accel::features::AlphaClass;
 use crate::interface::records::lights::LightRecord;
 
-/// Importance of a light of this radiance (or intensity, or irradiance; linear RGB): the root mean square of its channels. Sampling in proportion to it minimizes
-/// the squared error summed over channels; in proportion to luminance, blue lights would be undersampled and noisy.
+/// Importance of a light of this radiance (or intensity, or irradiance; linear RGB): the root mean
+/// square of its channels. Sampling in proportion to it minimizes the squared error summed over
+/// channels; in proportion to luminance, blue lights would be undersampled and noisy.
 pub(in super::super) fn brightness(c: Vec3) -> f64 {
     (c.as_dvec3().length_squared() / 3.0).sqrt()
 }
 
-/// Makes the lights of a scene, again and again if they move: what does not depend on where they are is found once.
+/// Makes the lights of a scene, again and again if they move: what does not depend on where they
+/// are is found once.
 pub(in super::super) struct LightBuilder {
     pub(super) origin: DVec3,
     /// Radiance of what surrounds the scene, averaged over the sphere.
@@ -28,7 +30,8 @@ pub(in super::super) struct LightBuilder {
     pub(super) means: HashMap<Option<usize>, Vec4>,
 }
 
-/// Collects lights: placed ones with their bounds, then distant ones with the weights by which they are chosen.
+/// Collects lights: placed ones with their bounds, then distant ones with the weights by which they
+/// are chosen.
 #[derive(Default)]
 pub(super) struct LightCollector {
     pub(super) records: Vec<LightRecord>,
@@ -37,7 +40,8 @@ pub(super) struct LightCollector {
 }
 
 impl LightCollector {
-    /// Adds a placed light and returns its index. A light that emits nothing is not sampled: [`INVALID`].
+    /// Adds a placed light and returns its index. A light that emits nothing is not sampled:
+    /// [`INVALID`].
     pub(super) fn push_placed(&mut self, record: LightRecord, bounds: Bounds) -> u32 {
         debug_assert!(self.weights.is_empty(), "placed lights come first");
         if bounds.intensity.is_nan() || bounds.intensity <= 0.0 {
@@ -48,8 +52,8 @@ impl LightCollector {
         self.records.len() as u32 - 1
     }
 
-    /// Adds a distant light and returns its index. `weight`: irradiance that it brings, by which it is chosen among its like. Without any it is not sampled:
-    /// [`INVALID`].
+    /// Adds a distant light and returns its index. `weight`: irradiance that it brings, by which it
+    /// is chosen among its like. Without any it is not sampled: [`INVALID`].
     pub(super) fn push_distant(&mut self, record: LightRecord, weight: f64) -> u32 {
         if weight.is_nan() || weight <= 0.0 {
             return INVALID;

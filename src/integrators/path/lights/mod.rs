@@ -1,10 +1,12 @@
-//! The lights of a scene as the path tracer samples them: [`LightRecord`]. They form two groups. Among *placed* lights, whose effect depends on the distance to
-//! them, a tree chooses by a bound of their contribution at a point ([`super::light_tree`]). *Distant* ones, the environment with its portals and directional
-//! lights, light all points alike and are chosen by the irradiance that they bring. Power decides nothing: that of what lights a whole scene grows with the
-//! scene, and a light beside it would get no samples where it is the brightest there is.
+//! The lights of a scene as the path tracer samples them: [`LightRecord`]. They form two groups.
+//! Among *placed* lights, whose effect depends on the distance to them, a tree chooses by a bound
+//! of their contribution at a point ([`super::light_tree`]). *Distant* ones, the environment with
+//! its portals and directional lights, light all points alike and are chosen by the irradiance that
+//! they bring. Power decides nothing: that of what lights a whole scene grows with the scene, and a
+//! light beside it would get no samples where it is the brightest there is.
 //!
-//! What is chosen by irradiance may be hidden where another light is not, so that each choice leaves a share to all: no light is sampled so rarely that few
-//! samples do not tell of it.
+//! What is chosen by irradiance may be hidden where another light is not, so that each choice
+//! leaves a share to all: no light is sampled so rarely that few samples do not tell of it.
 
 mod collect;
 pub(super) mod device;
@@ -31,8 +33,8 @@ use crate::scene::{Geometry, Light, Scene};
 use collect::LightCollector;
 pub(super) use collect::{LightBuilder, brightness};
 
-/// Fraction of the samples of distant lights that go to the environment and to directional lights in equal parts, and to each of these in equal parts,
-/// whatever irradiance they bring.
+/// Fraction of the samples of distant lights that go to the environment and to directional lights
+/// in equal parts, and to each of these in equal parts, whatever irradiance they bring.
 const EVEN_SHARE: f64 = 0.5;
 
 /// The lights of a scene.
@@ -46,10 +48,12 @@ pub(super) struct Lights {
     pub starts: Vec<u32>,
     /// The tree over placed lights; without any a leaf that emits nothing.
     pub tree: Vec<LightNode>,
-    /// Irradiance that distant lights bring to a surface that faces them, if nothing is in the way ([`brightness`]).
+    /// Irradiance that distant lights bring to a surface that faces them, if nothing is in the way
+    /// ([`brightness`]).
     pub distant_irradiance: f64,
-    /// For each instance of the scene the index in this table at which the lights of its primitives begin, or [`INVALID`]; then the light of each primitive, or
-    /// [`INVALID`]. Empty if no surface emits.
+    /// For each instance of the scene the index in this table at which the lights of its primitives
+    /// begin, or [`INVALID`]; then the light of each primitive, or [`INVALID`]. Empty if no surface
+    /// emits.
     pub light_of: Vec<u32>,
     /// Index of the environment, if it is sampled.
     pub environment: Option<u32>,
@@ -89,7 +93,8 @@ impl Lights {
 }
 
 impl LightBuilder {
-    /// For lights of `flat`. `environment`: radiance of what surrounds it, averaged over the sphere.
+    /// For lights of `flat`. `environment`: radiance of what surrounds it, averaged over the
+    /// sphere.
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
         let scene = flat.scene;
         let moves = |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
@@ -102,7 +107,8 @@ impl LightBuilder {
         }
     }
 
-    /// Kinds of lights that moving surfaces may become: a sphere whose scale is not uniform is none at times.
+    /// Kinds of lights that moving surfaces may become: a sphere whose scale is not uniform is none
+    /// at times.
     pub fn moving_kinds(&self, scene: &Scene) -> impl Iterator<Item = Kind> {
         let is_sphere = |mesh: usize| matches!(scene.meshes[mesh].geometry, Geometry::Spheres(_));
         let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emissive != Vec3::ZERO;
@@ -146,8 +152,8 @@ impl LightBuilder {
     }
 }
 
-/// Probabilities of distant lights, of which the first `directional` are directional lights and the others the environment and its portals. `sky`: irradiance
-/// that the environment brings.
+/// Probabilities of distant lights, of which the first `directional` are directional lights and the
+/// others the environment and its portals. `sky`: irradiance that the environment brings.
 fn distant_probabilities(weights: &[f64], directional: usize, sky: f64) -> Vec<f64> {
     let (suns, openings) = weights.split_at(directional);
     let sun: f64 = suns.iter().sum();
