@@ -43,8 +43,8 @@ pub struct PlainTime {
 }
 
 impl PlainTime {
-    /// The times of images that took `ms` for so many paths: a line through two points, neither part of which
-    /// is negative.
+    /// The times of images that took `ms` for so many paths: a line through two points, neither
+    /// part of which is negative.
     fn through([few, many]: [u32; 2], [least, most]: [f64; 2]) -> Self {
         let per_path = ((most - least) / f64::from(many - few)).clamp(0.0, most / f64::from(many));
         // times have noise: paths are not free

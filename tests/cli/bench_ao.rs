@@ -29,7 +29,7 @@ fn wrong_usage() {
     fails(&run(&["--series", "time"]), 64, &["time", "triangles"]);
     fails(&run(&["--series", "rays", "--parts", "rest"]), 64, &["--series", "--parts"]);
     fails(&run(&["--frames", "1"]), 64, &["--frames"]);
-    fails(&run(&["--reference-rays", "1"]), 64, &["--reference-rays"]);
+    fails(&run(&["--reference-rays", "1"]), 64, &["--reference-paths"]);
     fails(&run(&["--size", "big"]), 64, &["--size"]);
     fails(&run(&["--plot", "a.pdf"]), 64, &["must end in .svg"]);
     fails(&run(&["--baseline", "/nonexistent.json"]), 3, &["/nonexistent.json", "no such file"]);
