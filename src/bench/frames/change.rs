@@ -297,7 +297,7 @@ impl Lag {
 }
 
 /// Adds to `ghosting` how much of `old`, the reference before the change, an image shows. `settled` is what the image ends at when nothing changes any more: what
-/// is always wrong with it is no ghost. `None` where nothing differs.
+/// is always wrong with it is no ghost. `mask`: a value a pixel, above 0 where pixels take part, with all channels of an image. `None` where nothing differs.
 pub fn add_ghost(
     ghosting: &mut Ghosting,
     (image, settled): (&[f32], &[f32]),
@@ -306,7 +306,12 @@ pub fn add_ghost(
 ) -> Option<Residual> {
     // as if it settled at the reference
     let shifted: Vec<f32> = image.iter().zip(settled).zip(reference).map(|((v, s), t)| v - s + t).collect();
-    ghosting.add(&shifted, reference, old, mask)
+    // a value a channel
+    let mask: Option<Vec<f32>> = mask.map(|mask| {
+        let channels = image.len() / mask.len().max(1);
+        mask.iter().flat_map(|&m| std::iter::repeat_n(m, channels)).collect()
+    });
+    ghosting.add(&shifted, reference, old, mask.as_deref())
 }
 
 #[cfg(test)]
@@ -322,5 +327,14 @@ mod tests {
         let mut ghosting = Ghosting::default();
         let left = add_ghost(&mut ghosting, (&image, &settled), (&new, &old), None).unwrap();
         assert!((left.share - 0.25).abs() < 1e-6 && (ghosting.energy() - 0.0625).abs() < 1e-6);
+    }
+
+    /// Two pixels of three channels, of which the second counts.
+    #[test]
+    fn a_pixel_counts_with_all_channels() {
+        let (old, new) = ([0.0; 6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+        let image = [9.0, 9.0, 9.0, 0.5, 0.5, 0.5];
+        let left = add_ghost(&mut Ghosting::default(), (&image, &new), (&new, &old), Some(&[0.0, 1.0])).unwrap();
+        assert!(left.pixels == 3 && (left.share - 0.5).abs() < 1e-6, "{left:?}");
     }
 }
