@@ -185,6 +185,9 @@ fn gpu_a_render_does_not_replace_files_of_its_scene() {
     gltf(dir.path(), "f.gltf", "set.ao.bin", "t.0001.png");
     fs::write(at("set.ao.bin"), triangle()).unwrap();
     image(&at("t.0001.png"), 0.5);
+    // a buffer may have any name
+    gltf(dir.path(), "v.gltf", "points.svg", "t.png");
+    fs::write(at("points.svg"), triangle()).unwrap();
     fs::write(at("m.obj"), "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n").unwrap();
     fs::write(at("m.mtl"), "newmtl m\nKd 1 1 1\nmap_Kd t.png\n").unwrap();
     fs::write(at("a.0002.png"), "").unwrap();
@@ -205,9 +208,9 @@ fn gpu_a_render_does_not_replace_files_of_its_scene() {
                 "an intermediate image would replace a file of the scene",
             ),
             ("compare --scene s.gltf --a ao --b ao-sky --size 8x8 --difference t.png", "--difference would replace a file"),
-            ("compare ao-vs-path s.gltf --size 8x8 --plot t.png", "--plot would replace a file of the scene"),
+            ("compare ao-vs-path v.gltf --size 8x8 --plot points.svg", "--plot would replace a file of the scene"),
             ("bench rays s.gltf --quick --csv buffer.bin", "--csv would replace a file of the scene"),
-            ("bench frames s.gltf --quick --plot t.png", "--plot would replace a file of the scene"),
+            ("bench frames v.gltf --quick --plot points.svg", "--plot would replace a file of the scene"),
         ],
     );
     // an image takes the place of the one that it goes on from
