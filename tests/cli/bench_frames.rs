@@ -109,6 +109,8 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
     assert!(of("animation", "update") > 0.0 && of("animation", "ghosting") >= 0.0);
     let errors = along("turn", "RMSE");
     assert!(of("turn", "left") > 0.0 && errors[0].1 > errors[7].1, "{errors:?}");
+    let left = along("turn", "left");
+    assert!(left.len() == errors.len() && left[0].1 > left[7].1, "{left:?}");
     assert!(of("sidestep", "recovered").is_finite() && find(&record, [scene, "sidestep", "balanced", "left"]).is_none());
     let mut rows = csv::Reader::from_path(&csv).unwrap();
     let head = rows.headers().unwrap().clone();

@@ -242,6 +242,9 @@ fn measure_preset(
     row.exact(plain("half-life of memory", "frames"), lag.memory.fitted_half_life());
     row.exact(plain("gone", "frames"), lag.left.gone().map(|n| n as f64));
     row.exact(plain("ghosting", ""), lag.ghosting);
+    for (frame, (left, memory)) in (1..).zip(lag.left.residuals().iter().zip(lag.memory.residuals())) {
+        row.at(AXIS, f64::from(frame)).exact(plain("left", ""), *left).exact(plain("memory", ""), *memory);
+    }
     run.memory_half_life = Some(lag.memory.fitted_half_life());
     if let (Some(mask), true) = (mask, stage.channels() == 1) {
         // the sampler goes on: each run is another
