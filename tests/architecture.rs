@@ -37,9 +37,6 @@ const LAYERS: &[&[&str]] = &[
     &["cli"],
 ];
 
-/// Rooms and folders whose files are still in larger circles than `MAX_CIRCLE`.
-const TIED: &[&str] = &["src/bench"];
-
 /// No circle of files has more of them than this.
 const MAX_CIRCLE: usize = 4;
 
@@ -329,8 +326,7 @@ fn circles_of_files_are_small() {
     for circle in circles {
         let files: Vec<&str> = circle.files.iter().map(|f| names[f].as_str()).collect();
         println!("circle of {} files: {}", files.len(), files.join(" "));
-        let is_tied = |f: &&str| TIED.iter().any(|t| f.starts_with(t));
-        if files.len() > MAX_CIRCLE && !files.iter().all(is_tied) {
+        if files.len() > MAX_CIRCLE {
             wrong += &format!("\n{} files:\n", files.len());
             circle.ties.iter().for_each(|(from, to, names)| wrong += &format!("  {from} uses {to} ({names})\n"));
         }

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
+use super::pictures::Part;
 use crate::accel::features::AlphaClass;
 use crate::interface::records::lights::LightRecord;
 
@@ -28,6 +29,10 @@ pub(in super::super) struct LightBuilder {
     pub(super) moves: Vec<bool>,
     /// Means of the textures of emitters, by index.
     pub(super) means: HashMap<Option<usize>, Vec4>,
+    /// Number of parts along an edge of each triangle with a picture.
+    pub(super) side: u32,
+    /// Parts of each triangle of the meshes with a picture, by mesh.
+    pub(super) parts: HashMap<usize, Vec<Vec<Part>>>,
 }
 
 /// Collects lights: placed ones with their bounds, then distant ones with the weights by which they

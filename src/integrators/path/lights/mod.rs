@@ -98,12 +98,15 @@ impl LightBuilder {
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
         let scene = flat.scene;
         let moves = |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
+        let moves: Vec<bool> = scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect();
         Self {
             origin: flat.origin,
             environment,
             alpha: alpha_classes(scene, flat.blend),
-            moves: scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect(),
             means: HashMap::new(),
+            side: pictures::side(pictures::count_triangles(scene, &moves)),
+            parts: HashMap::new(),
+            moves,
         }
     }
 

@@ -5,7 +5,7 @@ use glam::{DVec2, Vec3};
 
 use super::brightness;
 use crate::interface::records::lights::{LIGHT_COLUMN_AT, LIGHT_ROW_AT, LIGHT_SIDE_AT, LIGHT_TURNED};
-use crate::scene::{Scene, Texture, TextureSlot, TriangleMesh};
+use crate::scene::{Geometry, Mesh, Scene, Texture, TextureSlot, TriangleMesh};
 
 /// Most parts along an edge of a triangle. Its number has five bits.
 const MAX_SIDE: u32 = 16;
@@ -36,6 +36,18 @@ impl Part {
     fn in_whole(&self, at: DVec2) -> DVec2 {
         self.corner + self.scale * at
     }
+}
+
+/// Number of triangles at rest whose radiance a texture says. `moves`: for each instance, it moves
+/// or deforms.
+pub(super) fn count_triangles(scene: &Scene, moves: &[bool]) -> usize {
+    let has_picture = |mesh: &Mesh| {
+        let material = &scene.materials[mesh.material];
+        material.emissive != Vec3::ZERO && material.emissive_texture.is_some()
+    };
+    let at_rest = scene.instances.iter().zip(moves).filter(|(_, moves)| !**moves).map(|(i, _)| &scene.meshes[i.mesh]);
+    let triangles = |mesh: &Mesh| if let Geometry::Triangles(t) = &mesh.geometry { t.indices.len() } else { 0 };
+    at_rest.filter(|mesh| has_picture(mesh)).map(triangles).sum()
 }
 
 /// Parts along an edge of each triangle of a scene that has so many with a picture.
@@ -73,8 +85,13 @@ impl<'s> Picture<'s> {
         Self { mesh, texture: &scene.textures[slot.texture], slot, emissive }
     }
 
+    /// The parts of each triangle ([`Picture::parts`]).
+    pub fn all_parts(&self, side: u32, whole: f64) -> Vec<Vec<Part>> {
+        (0..self.mesh.indices.len()).map(|k| self.parts(k, side, whole)).collect()
+    }
+
     /// The parts of a triangle, or none if it had better be sampled as a whole. `whole`: brightness of the mean radiance of all triangles.
-    pub fn parts(&self, triangle: usize, side: u32, whole: f64) -> Vec<Part> {
+    fn parts(&self, triangle: usize, side: u32, whole: f64) -> Vec<Part> {
         let coordinates = self.mesh.texcoords.get(self.slot.texcoord).filter(|c| !c.is_empty());
         let Some(coordinates) = coordinates.filter(|_| side > 1 && !self.texture.texels.is_empty()) else { return Vec::new() };
         let [a, b, c] = self.mesh.indices[triangle].map(|k| self.slot.transform.transform_point2(coordinates[k as usize]));

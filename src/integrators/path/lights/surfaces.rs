@@ -6,12 +6,12 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
-use super::pictures::{self, Part, Picture};
+use super::pictures::{Part, Picture};
 use super::{LightBuilder, LightCollector, brightness};
 use crate::accel::features::AlphaClass;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightRecord};
-use crate::scene::{AlphaMode, Geometry, Material, Mesh, Scene, TriangleMesh};
+use crate::scene::{AlphaMode, Geometry, Material, Scene, TriangleMesh};
 
 /// Bound of the rounding error of a point on a light, as a fraction of its coordinates.
 const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
@@ -19,8 +19,7 @@ const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 /// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a non-uniform scale has no closed form: only BSDF sampling finds
 /// it.
 pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &Scene) -> Vec<u32> {
-    let LightBuilder { origin, alpha, moves, means, .. } = builder;
-    let side = pictures::side(triangles_with_pictures(scene, moves));
+    let LightBuilder { origin, alpha, moves, means, side, parts, .. } = builder;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
@@ -54,10 +53,13 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                 // what moves may be a rectangle at times, but its lights are of one kind
                 let plain = material.emissive_texture.is_none() && !is_tested && !moves[i];
                 let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - *origin;
-                let slot = material.emissive_texture.filter(|_| !moves[i]);
-                let picture = slot.map(|slot| Picture::new(scene, t, slot, material.emissive));
+                let slot = material.emissive_texture.filter(|_| !moves[i] && *side > 1);
+                let pictured = slot.map(|slot| {
+                    let all_parts = || Picture::new(scene, t, slot, material.emissive).all_parts(*side, of_textures);
+                    &*parts.entry(instance.mesh).or_insert_with(all_parts)
+                });
                 // none, one, or many lights of a triangle: in proportion to its own brightness, and alpha for all alike
-                let parts = |k: usize| picture.as_ref().map_or_else(Vec::new, |p| p.parts(k, side, of_textures));
+                let parts = |k: usize| pictured.map_or(&[][..], |parts| &parts[k]);
                 let lights =
                     add_triangles(all, t, point, plain, (brightness, alpha_factor), parts, LightRecord { flags, ..base });
                 of_primitives.extend(lights);
@@ -101,26 +103,16 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
     light_of
 }
 
-/// Number of triangles at rest that emit what a texture says.
-fn triangles_with_pictures(scene: &Scene, moves: &[bool]) -> usize {
-    let shows = |mesh: &Mesh| {
-        let material = &scene.materials[mesh.material];
-        material.emissive != Vec3::ZERO && material.emissive_texture.is_some()
-    };
-    let at_rest = scene.instances.iter().zip(moves).filter(|(_, moves)| !**moves).map(|(i, _)| &scene.meshes[i.mesh]);
-    let triangles = |mesh: &Mesh| if let Geometry::Triangles(t) = &mesh.geometry { t.indices.len() } else { 0 };
-    at_rest.filter(|mesh| shows(mesh)).map(triangles).sum()
-}
-
-/// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are one light; one that has `parts` is as many. `brightness`: of all of it, and
-/// the factor that its alpha is of it. Returns the light of each triangle, the first of its parts.
-fn add_triangles(
+/// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are
+/// one light; a triangle that has `parts` is as many lights. `brightness`: that of the whole mesh,
+/// and the factor in it that alpha is. Returns the light of each triangle, the first of its parts.
+fn add_triangles<'p>(
     all: &mut LightCollector,
     mesh: &TriangleMesh,
     point: impl Fn(u32) -> DVec3,
     plain: bool,
     (brightness, alpha_factor): (f64, f64),
-    parts: impl Fn(usize) -> Vec<Part>,
+    parts: impl Fn(usize) -> &'p [Part],
     base: LightRecord,
 ) -> Vec<u32> {
     let mut of_primitives = Vec::with_capacity(mesh.indices.len());
@@ -167,13 +159,13 @@ fn add_triangles(
         }
         let [a, b, c] = corners;
         let (e1, e2) = (b - a, c - a);
-        let mut part = |part: Part| {
+        let mut part = |part: &Part| {
             let corner = a + part.corner.x * e1 + part.corner.y * e2;
             let triangle = [corner, part.scale * e1, part.scale * e2];
             push(Kind::Triangle, triangle, k, 0.0, part.flags, part.brightness * alpha_factor)
         };
         // they follow one another: shaders count from the first
-        let indices: Vec<u32> = parts(k).into_iter().map(&mut part).collect();
+        let indices: Vec<u32> = parts(k).iter().map(&mut part).collect();
         let first = indices.first().copied();
         of_primitives.push(first.unwrap_or_else(|| push(Kind::Triangle, [a, e1, e2], k, 0.0, 0, brightness)));
         k += 1;
