@@ -7,8 +7,8 @@
 //     float sky_pdf(PathParams, Shading, from, wi)    density with which light_sample finds what is outside the scene in a direction, but for distant disks
 //
 // The integrator knows no more than this: a kind is a file in this folder that defines both with its name before them (`spot_sample`, `spot_pdf`), and a line of
-// `LightKinds` in src/interface/features.rs, of which the functions above are made. Both densities are multiplied by the probability of choosing the light,
-// LightRecord.probability.
+// `LightKinds` in src/interface/features.rs, of which the functions above are made. Densities of distant lights are multiplied by the probability of choosing
+// one among them, LightRecord.probability, because several may shine from the same direction. Those of placed lights are of the point alone.
 #ifndef LIGHTS_LIGHT
 #define LIGHTS_LIGHT
 #include "common/warp.glsl"

@@ -13,7 +13,7 @@ float range_window(float distance, float range) {
 LightSample position_sample(LightRecord light, vec3 wi, float d2, float falloff) {
     float d = sqrt(d2);
     falloff = range_window(d, light.range) * falloff;
-    return LightSample(wi, d, light.position, light.intensity * (falloff / d2), light.probability, true);
+    return LightSample(wi, d, light.position, light.intensity * (falloff / d2), 1.0, true);
 }
 
 LightSample point_sample(PathParams p, LightRecord light, vec3 from, Shading m, vec2 u) {

@@ -19,7 +19,7 @@ float portal_density(LightRecord light, vec3 from, vec3 wi) {
     vec3 d = distance * wi - to;
     vec2 at = vec2(dot(d, light.axis) / dot(light.axis, light.axis), dot(d, light.edge) / dot(light.edge, light.edge));
     if (any(greaterThan(abs(at - 0.5), vec2(0.5 + PORTAL_MARGIN)))) return 0.0;
-    return rectangle_density(light, spherical_rectangle(light, from), distance, wi);
+    return light.probability * rectangle_density(light, spherical_rectangle(light, from), distance, wi);
 }
 
 // Of all portals: they follow the environment, which knows how many there are.

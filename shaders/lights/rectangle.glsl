@@ -50,9 +50,9 @@ vec2 sample_spherical_rectangle(SphericalRectangle s, vec2 u) {
 
 // Density of a point of a rectangle, per solid angle.
 float rectangle_density(LightRecord light, SphericalRectangle s, float distance, vec3 wi) {
-    if (is_wide(s)) return light.probability / s.solid_angle;
+    if (is_wide(s)) return 1.0 / s.solid_angle;
     float facing = abs(dot(cross(light.axis, light.edge), wi));
-    return facing > 0.0 ? light.probability * distance * distance / facing : 0.0;
+    return facing > 0.0 ? distance * distance / facing : 0.0;
 }
 
 LightSample rectangle_sample(PathParams p, LightRecord light, vec3 from, Shading m, vec2 u) {

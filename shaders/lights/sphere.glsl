@@ -22,14 +22,14 @@ LightSample sphere_sample(PathParams p, LightRecord light, vec3 from, Shading m,
     float distance = max(b - sqrt(max(light.radius * light.radius - dot(l, l), 0.0)), 0.0);
     // the nearest point of the sphere itself, from its centre: exact where from + distance * wi is not
     vec3 point = light.position + (light.radius + light.lift) * normalize(from + distance * wi - light.position);
-    return LightSample(wi, distance, point, light.intensity, light.probability / (2.0 * PI * cone), false);
+    return LightSample(wi, distance, point, light.intensity, 1.0 / (2.0 * PI * cone), false);
 }
 
 float sphere_pdf(LightRecord light, vec3 from, vec3 wi, float distance) {
     vec3 to = light.position - from;
     float d2 = dot(to, to);
     if (d2 <= light.radius * light.radius * (1.0 + 1e-5)) return 0.0;
-    return light.probability / (2.0 * PI * ball_cone(light.radius, d2));
+    return 1.0 / (2.0 * PI * ball_cone(light.radius, d2));
 }
 
 #endif

@@ -26,11 +26,11 @@ float turns_between(vec3 a, vec3 b) { return turns_of(length(cross(a, b)), dot(a
 
 // Density of a point of a triangle, per solid angle.
 float triangle_density(LightRecord light, SphericalTriangle s, float distance, vec3 wi) {
-    if (is_wide(s)) return light.probability / s.solid_angle;
+    if (is_wide(s)) return 1.0 / s.solid_angle;
     vec3 n = cross(light.axis, light.edge);
     // twice the area times |cos|
     float facing = abs(dot(n, wi));
-    return facing > 0.0 ? light.probability * 2.0 * distance * distance / facing : 0.0;
+    return facing > 0.0 ? 2.0 * distance * distance / facing : 0.0;
 }
 
 // A point of a triangle (barycentrics), even over the solid angle that it fills: Arvo, "Stratified Sampling of Spherical Triangles", 1995.

@@ -13,7 +13,7 @@
 
 // Fraction of a vertex's light samples that go to both groups in equal parts.
 const float EVEN_GROUPS = 0.5;
-// Fraction of the samples of placed lights that go to all of them in equal parts.
+// Fraction of the samples of placed lights that go to all of them in equal parts, but to the parts of one triangle by their brightness.
 const float EVEN_LIGHTS = 0.125;
 // With more placed lights than this, the number that chooses one is scrambled as suits a choice among many.
 const uint MANY_LIGHTS = 64u;
@@ -37,12 +37,12 @@ LightShares light_shares(PathParams p, vec3 from) {
     return LightShares(placed, 1.0 - placed);
 }
 
-// Chooses a distant light. u: uniformly distributed in [0, 1), and what is left of it.
-uint choose_distant_light(PathParams p, inout float u) {
-    if (!WITH_LIGHT_CHOICE) return p.placed_lights;
-    Words starts = Words(p.light_starts);
+// Chooses one of `count` outcomes by their cumulative distribution, which begins at `first`. Returns its index in `starts`. u: uniformly distributed in [0, 1), and what
+// is left of it.
+uint choose_by_starts(Words starts, uint first, uint count, inout float u) {
+    if (count <= 1u) return first;
     uint bits = uint(u * 4294967296.0);
-    uint low = 0u, count = p.distant_lights;
+    uint low = first;
     while (count > 1u) {
         uint half_ = count >> 1;
         if (starts.v[low + half_] <= bits) low += half_;
@@ -51,29 +51,32 @@ uint choose_distant_light(PathParams p, inout float u) {
     uint start = starts.v[low];
     // the last ends at 2^32, which is 0
     u = min(float(bits - start) / float(starts.v[low + 1u] - start), BELOW_1);
-    return p.placed_lights + low;
+    return low;
+}
+
+// Chooses a distant light. u: as above.
+uint choose_distant_light(PathParams p, inout float u) {
+    if (!WITH_LIGHT_CHOICE) return p.placed_lights;
+    // the distribution of placed lights, which has an entry more than there are lights, comes first
+    return choose_by_starts(Words(p.light_starts), p.placed_lights + 1u, p.distant_lights, u) - 1u;
 }
 
 // Probability with which a placed light is chosen that the tree chooses with this one. A light that the tree knows not to reach the point is never chosen.
-float placed_probability(PathParams p, float of_tree) {
-    return of_tree > 0.0 ? mix(of_tree, 1.0 / float(p.placed_lights), EVEN_LIGHTS) : 0.0;
-}
+float placed_probability(LightRecord light, float of_tree) { return of_tree > 0.0 ? mix(of_tree, light.probability, EVEN_LIGHTS) : 0.0; }
 
-// Chooses a placed light. Returns its probability; 0: none reaches the point. u: as above.
+// Chooses a placed light. Returns the probability with which the tree chooses it; 0: none reaches the point. u: as above.
 float choose_placed_light(PathParams p, vec3 from, inout float u, out uint light) {
     light = 0u;
     if (!WITH_LIGHT_TREE) return WITH_LIGHT_GROUPS && !(light_importance(load_light_node(p.light_tree, 0u), from) > 0.0) ? 0.0 : 1.0;
     bool is_even = u < EVEN_LIGHTS;
     uvec2 trail = uvec2(0u);
     if (is_even) {
-        u *= float(p.placed_lights) / EVEN_LIGHTS;
-        uint k = min(uint(u), p.placed_lights - 1u);
-        u = min(u - float(k), BELOW_1);
-        trail = light_trail(p.lights, k);
+        u *= 1.0 / EVEN_LIGHTS;
+        trail = light_trail(p.lights, choose_by_starts(Words(p.light_starts), 0u, p.placed_lights, u));
     } else {
         u = min((u - EVEN_LIGHTS) / (1.0 - EVEN_LIGHTS), BELOW_1);
     }
-    return placed_probability(p, descend_light_tree(p.light_tree, from, is_even, trail, u, light));
+    return descend_light_tree(p.light_tree, from, is_even, trail, u, light);
 }
 
 // What a light sample is for.
@@ -92,14 +95,15 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, vec2 u, uint wanted
             u.x = min(is_distant ? (u.x - shares.placed) / shares.distant : u.x / shares.placed, BELOW_1);
         }
         uint k;
+        float of_tree = 1.0;
         if (is_distant) {
             k = choose_distant_light(p, u.x);
-            probability = shares.distant;
         } else {
-            probability = shares.placed * choose_placed_light(p, from, u.x, k);
-            if (!(probability > 0.0)) return NO_LIGHT_SAMPLE;
+            of_tree = choose_placed_light(p, from, u.x, k);
+            if (!(of_tree > 0.0)) return NO_LIGHT_SAMPLE;
         }
         light = load_light_record(p.lights, k);
+        probability = is_distant ? shares.distant : WITH_LIGHT_TREE ? shares.placed * placed_probability(light, of_tree) : shares.placed;
     }
     LightSample l = light_sample(p, light, from, m, u);
     l.pdf *= probability;
@@ -121,7 +125,7 @@ float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi, LightShares share
     if (WITH_LIGHT_TREE) {
         float u = 0.0;
         uint leaf;
-        probability *= placed_probability(p, descend_light_tree(p.light_tree, from, true, uvec2(light.trail_low, light.trail_high), u, leaf));
+        probability *= placed_probability(light, descend_light_tree(p.light_tree, from, true, uvec2(light.trail_low, light.trail_high), u, leaf));
     }
     return probability > 0.0 ? probability * light_pdf(light, from, wi, hit.t) : 0.0;
 }

@@ -44,7 +44,7 @@ records! {
         intensity: vec3,
         /// Lights from a position: range beyond which the light has no effect, scene units.
         range: float,
-        /// Distant lights: probability of being chosen among them; placed ones: 1.
+        /// Distant lights: probability of being chosen among them; placed ones: in a choice that the point does not matter to.
         probability: float,
         /// Bit trail of a placed light in the tree: bit k is set where the light is in the second child at level k. Lower 32 bits.
         trail_low: uint,

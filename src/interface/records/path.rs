@@ -81,7 +81,7 @@ records! {
         light_tree: address,
         /// A `vec2` per path: width and spread of its ray cone (path/cone.glsl).
         cones: address,
-        /// The cumulative distribution of distant lights, `distant_lights + 1` uints.
+        /// The cumulative distribution of placed lights, `placed_lights + 1` uints, then that of distant ones, `distant_lights + 1`.
         light_starts: address,
         /// Index of the first directional light.
         first_disk: uint,

@@ -41,6 +41,9 @@ pub(in super::super) struct LightBuilder {
 pub(super) struct LightCollector {
     pub(super) records: Vec<LightRecord>,
     pub(super) bounds: Vec<Bounds>,
+    /// For each placed light its weight in a choice that the point does not matter to: 1, and for
+    /// the parts of a triangle 1 together.
+    pub(super) even_shares: Vec<f64>,
     pub(super) weights: Vec<f64>,
 }
 
@@ -48,12 +51,19 @@ impl LightCollector {
     /// Adds a placed light and returns its index. A light that emits nothing is not sampled:
     /// [`INVALID`].
     pub(super) fn push_placed(&mut self, record: LightRecord, bounds: Bounds) -> u32 {
+        self.push_part(record, bounds, 1.0)
+    }
+
+    /// Adds a placed light that is a part of one, `share` of its power, and returns its index. One
+    /// that emits nothing is not sampled: [`INVALID`].
+    pub(super) fn push_part(&mut self, record: LightRecord, bounds: Bounds, share: f64) -> u32 {
         debug_assert!(self.weights.is_empty(), "placed lights come first");
         if bounds.intensity.is_nan() || bounds.intensity <= 0.0 {
             return INVALID;
         }
-        self.records.push(LightRecord { probability: 1.0, ..record });
+        self.records.push(record);
         self.bounds.push(bounds);
+        self.even_shares.push(share);
         self.records.len() as u32 - 1
     }
 

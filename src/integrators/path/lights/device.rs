@@ -25,7 +25,7 @@ impl DeviceLights {
     pub fn new(device: &Arc<Device>, lights: Lights) -> Result<Self> {
         Ok(Self {
             records: upload(device, "lights", &lights.records)?,
-            starts: upload(device, "distribution of distant lights", &lights.starts)?,
+            starts: upload(device, "distributions of lights", &lights.starts)?,
             tree: upload(device, "light tree", &lights.tree)?,
             light_of: upload(device, "light indices", &lights.light_of)?,
             lights,

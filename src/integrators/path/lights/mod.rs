@@ -44,7 +44,8 @@ pub(super) struct Lights {
     pub records: Vec<LightRecord>,
     /// Number of placed lights.
     pub placed: u32,
-    /// [`CumulativeTable::starts`] of the distant lights.
+    /// [`CumulativeTable::starts`] of placed lights, `placed + 1` numbers, then those of distant
+    /// ones.
     pub starts: Vec<u32>,
     /// The tree over placed lights; without any a leaf that emits nothing.
     pub tree: Vec<LightNode>,
@@ -68,7 +69,7 @@ impl Lights {
     pub fn environment_only() -> Self {
         let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
         let tree = vec![light_tree::no_lights()];
-        Self { records: vec![record], starts: vec![0; 2], tree, environment: Some(0), ..Default::default() }
+        Self { records: vec![record], starts: vec![0; 3], tree, environment: Some(0), ..Default::default() }
     }
 
     /// The kinds of lights that are sampled.
@@ -126,6 +127,10 @@ impl LightBuilder {
         scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, self, l));
         let light_of = surfaces::add(&mut all, self, scene);
         let placed = all.records.len();
+        let evenly = CumulativeTable::new(&all.even_shares);
+        for (record, &probability) in all.records.iter_mut().zip(&evenly.probabilities) {
+            record.probability = probability;
+        }
         let mut lights = Lights { light_of, placed: placed as u32, ..Default::default() };
         if placed > 0 {
             let trails;
@@ -150,7 +155,8 @@ impl LightBuilder {
         for (record, &probability) in lights.records[placed..].iter_mut().zip(&table.probabilities) {
             record.probability = probability;
         }
-        lights.starts = table.starts;
+        lights.starts = if placed > 0 { evenly.starts } else { vec![0] };
+        lights.starts.extend(table.starts);
         lights
     }
 }

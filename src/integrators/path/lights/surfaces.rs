@@ -119,7 +119,8 @@ fn add_triangles<'p>(
     let two_sided = base.flags & LIGHT_TWO_SIDED != 0;
     // a mirroring transform reverses the winding
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
-    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, flags: u32, brightness: f64| {
+    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, part: (u32, f64), brightness: f64| {
+        let (flags, share) = part;
         let normal = turn * e1.cross(e2);
         let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
         let (b, c) = (a + e1, a + e2);
@@ -145,29 +146,31 @@ fn add_triangles<'p>(
             two_sided,
             intensity: area * brightness,
         };
-        all.push_placed(record, bounds)
+        all.push_part(record, bounds, share)
     };
+    let whole = (0, 1.0);
     let mut k = 0;
     while k < mesh.indices.len() {
         let corners = mesh.indices[k].map(&point);
         let next = mesh.indices.get(k + 1).filter(|_| plain).map(|n| n.map(&point));
         if let Some((rectangle, slack)) = next.and_then(|next| rectangle(corners, next)) {
-            let index = push(Kind::Rectangle, rectangle, k, slack, 0, brightness);
+            let index = push(Kind::Rectangle, rectangle, k, slack, whole, brightness);
             of_primitives.extend([index; 2]);
             k += 2;
             continue;
         }
         let [a, b, c] = corners;
         let (e1, e2) = (b - a, c - a);
+        let all_parts: f64 = parts(k).iter().map(|p| p.brightness).sum();
         let mut part = |part: &Part| {
             let corner = a + part.corner.x * e1 + part.corner.y * e2;
             let triangle = [corner, part.scale * e1, part.scale * e2];
-            push(Kind::Triangle, triangle, k, 0.0, part.flags, part.brightness * alpha_factor)
+            push(Kind::Triangle, triangle, k, 0.0, (part.flags, part.brightness / all_parts), part.brightness * alpha_factor)
         };
         // they follow one another: shaders count from the first
         let indices: Vec<u32> = parts(k).iter().map(&mut part).collect();
         let first = indices.first().copied();
-        of_primitives.push(first.unwrap_or_else(|| push(Kind::Triangle, [a, e1, e2], k, 0.0, 0, brightness)));
+        of_primitives.push(first.unwrap_or_else(|| push(Kind::Triangle, [a, e1, e2], k, 0.0, whole, brightness)));
         k += 1;
     }
     of_primitives
