@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::camera::Choice;
 use crate::scene::{Camera, EnvironmentMap, builtin, load};
 
@@ -170,7 +171,7 @@ impl SceneList {
 /// # Errors
 /// Those of [`load::load`]; [`Error::Usage`] for a JSON file, which is no scene: whoever names one wants the record there.
 pub fn check_exists(source: &str) -> Result<()> {
-    if Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+    if files::has_extension(Path::new(source), "json") {
         return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
     }
     let made = builtin::exists(source.strip_prefix("builtin:").unwrap_or(source));

@@ -107,6 +107,8 @@ impl BenchRaysArgs {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use clap::Parser;
 
     use super::*;
@@ -147,7 +149,8 @@ mod tests {
         assert!(parse(&["--json"]).common.console().json);
         let to_file = parse(&["--json=a.json", "scene"]);
         assert!(!to_file.common.console().json && to_file.common.outputs.json_file().is_some() && to_file.scenes == ["scene"]);
-        // a scene after --json is a scene
-        assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
+        assert_eq!(parse(&["--json", "A.JSON", "scene"]).common.outputs.json_file().unwrap(), Path::new("A.JSON"));
+        // a record takes no scene's place
+        assert!(Alone::try_parse_from(["bench", "--json", "scene.glb"]).unwrap_err().to_string().contains("ends in .json"));
     }
 }
