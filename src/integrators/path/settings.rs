@@ -164,8 +164,8 @@ pub struct PathOptions {
     pub lens: Option<Lens>,
     /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
-    /// Tiles of the image that show geometry; only if the environment is black and
-    /// [`PathOptions::is_sharp`].
+    /// Tiles of the image that show geometry; only if the environment is black, and a pixel sees
+    /// only what projects into its area: no lens and no wide filter.
     pub tile_mask: Option<Arc<TileMask>>,
     /// The film to resume, and when to save it.
     pub film: FilmOptions,
@@ -423,11 +423,6 @@ impl PathOptions {
     /// The options' part of the JSON record.
     pub(super) fn record(&self) -> Map<String, Value> {
         self.described().into_iter().map(|(key, _, value)| (key.to_owned(), value)).collect()
-    }
-
-    /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
-    pub fn is_sharp(&self) -> bool {
-        self.pixel_filter.is_within_pixel() && self.lens.is_none()
     }
 }
 
