@@ -43,7 +43,7 @@ pub use passes::nodes::NodeVisits;
 use passes::{debug, debug_view};
 use resample::SeenSurfaces;
 use resources::{Extent, Resource, SURFACE_BYTES};
-pub use settings::{Budget, Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
+pub use settings::{Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
 
 /// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as another surface.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
@@ -179,7 +179,7 @@ impl Realtime {
         settings.check()?;
         let settings = &settings.with_launches_of(&tracer.device().info);
         let block = Block { origin: [0, 0], size };
-        let rays = u64::from(block.rays()) * u64::from(settings.most_rays().max(settings.rays_per_pixel));
+        let rays = u64::from(block.rays()) * u64::from(settings.rays_per_pixel);
         if rays > u64::from(u32::MAX) {
             return Err(Error::Usage(format!(
                 "{} rays per pixel of {}x{}: a frame has 2^32 rays at most; use fewer, or a smaller image",
@@ -195,7 +195,6 @@ impl Realtime {
             pixels: pixels(size),
             tiled_pixels: block.rays().into(),
             half_pixels: pixels(size.map(|n| n.div_ceil(2))),
-            most_rays: settings.most_rays().into(),
             launch_rays: launch_rays(&tracer.device().info).into(),
         };
         let device = tracer.device();

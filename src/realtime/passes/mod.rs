@@ -2,7 +2,6 @@
 
 mod antialias;
 mod ao_trace;
-mod budget;
 mod compose;
 pub mod debug;
 pub mod display;
@@ -28,7 +27,7 @@ use std::sync::Arc;
 use super::frame_samples::FrameSamples;
 use super::graph::{Range, Stage};
 use super::resources::Resource;
-use super::settings::{Budget, Settings, Technique};
+use super::settings::{Settings, Technique};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::block::{Block, TILE_PIXELS};
@@ -79,21 +78,13 @@ pub fn stages(
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let mut stages = vec![gbuffer::stage(tracer, block, settings, primary)?];
-    match (settings.technique, settings.budget) {
-        (Technique::Larsen, _) => {
+    match settings.technique {
+        Technique::Larsen => {
             stages.extend(larsen::stages(tracer, block.size, settings, lights)?);
             return Ok(stages);
         }
-        (Technique::Gtao, _) => stages.push(gtao::stage(tracer, pixels)?),
-        (Technique::Traced, Budget::Variance) => {
-            stages.extend(budget::stages(tracer, block.rays(), settings)?);
-            stages.push(Stage::new(
-                vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)],
-                Range::launches(pixels * settings.most_rays(), 1, settings.launch_rays),
-            ));
-            stages.push(Stage::new(vec![Box::new(gather::Gather::new(tracer, settings)?)], Range::all(block.rays())));
-        }
-        (Technique::Traced, Budget::Uniform) => {
+        Technique::Gtao => stages.push(gtao::stage(tracer, pixels)?),
+        Technique::Traced => {
             let n = settings.rays_per_pixel;
             let mut stage: Vec<Box<dyn super::graph::Pass>> = vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)];
             if n > 1 {
