@@ -2,16 +2,22 @@
 
 use super::settings::Settings;
 
-/// Number of the first long frame at rest, from 1, where long frames do not begin with few samples: who stops for a moment has pictures as often as before. Samples of short frames lie at the frame's place
-/// in all pixels, so more of them leave edges jagged.
+/// Number of the first long frame at rest, from 1, where long frames do not begin with few samples:
+/// who stops for a moment has pictures as often as before. Samples of short frames lie at the
+/// frame's place in all pixels, so more of them leave edges jagged.
 const FIRST_LONG: u32 = 4;
 
-/// A long frame after others has at most a part of so many of all samples at rest: who watches sees the image change as often as it changes visibly.
+/// A long frame after others has at most a part of so many of all samples at rest: who watches sees
+/// the image change as often as it changes visibly.
 const PARTS: u32 = 8;
 
-/// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames in motion are short. At rest, after a few of them, come long ones: what a frame costs besides its samples, and
-/// does not depend on their number, is a third to a half of the time of a short one. Those of radiance become longer with the samples there are: by powers of two, so that each begins at a multiple of its
-/// number and together they fill the sequence evenly. First each has as many as all before it (2, 2, 4, 8; where short ones have 4, 4, 4, 8), then as many for some time, and then a part of those before it.
+/// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames
+/// in motion are short. At rest, after a few of them, come long ones: what a frame costs besides
+/// its samples, and does not depend on their number, is a third to a half of the time of a short
+/// one. Those of radiance become longer with the samples there are: by powers of two, so that each
+/// begins at a multiple of its number and together they fill the sequence evenly. First each has as
+/// many as all before it (2, 2, 4, 8; where short ones have 4, 4, 4, 8), then as many for some
+/// time, and then a part of those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSamples {
     /// In a short frame.
@@ -26,18 +32,22 @@ pub struct FrameSamples {
     first_long: u32,
     /// Number of short frames in which each pixel is sampled once.
     period: u32,
-    /// Samples at rest start anew with the first long frame: those of the short ones lie at the frame's place in all pixels, and may all be bright there.
+    /// Samples at rest start anew with the first long frame: those of the short ones lie at the
+    /// frame's place in all pixels, and may all be bright there.
     forgets_short: bool,
 }
 
 impl FrameSamples {
-    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames at rest all sample the same pattern, and so have the same number. `is_cpu`: the device is a processor, as opposed to a GPU.
+    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames
+    /// at rest all sample the same pattern, and so have the same number. `is_cpu`: the device is a
+    /// processor, as opposed to a GPU.
     pub fn of_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
         // a tenth of a frame's time is then for other things
         const FIRST_PER_PIXEL: u64 = 8;
         // a fortieth
         const MAX_PER_PIXEL: u64 = 32;
-        // the first long frames take about a second on two cores, and a tenth of that on a GPU that traces 160 times as many
+        // the first long frames take about a second on two cores, and a tenth of that on a GPU that
+        // traces 160 times as many
         const FIRST_PATHS: u64 = 1 << 20;
         const FIRST_GPU_PATHS: u64 = 1 << 24;
         const GROWTH: u64 = 4;
@@ -57,7 +67,8 @@ impl FrameSamples {
         Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
     }
 
-    /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight samples of a pixel on.
+    /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight
+    /// samples of a pixel on.
     pub fn of_visibility(settings: &Settings, pixels: u64) -> Self {
         // half a second on two cores, where that is enough for eight; in large images seconds
         const MAX_PER_PIXEL: u64 = 16;
@@ -82,7 +93,7 @@ impl FrameSamples {
     }
 
     /// Samples of a pixel in the frame.
-    pub fn of(&self, resting: u32) -> u32 {
+    pub fn in_frame(&self, resting: u32) -> u32 {
         let Some(long) = resting.checked_sub(self.first_long) else { return self.few };
         if long <= self.ramp {
             (self.many >> self.ramp) << long.saturating_sub(1)
@@ -101,7 +112,8 @@ impl FrameSamples {
         self.many << self.doublings
     }
 
-    /// How often the number of samples has doubled by the long frame with this index, those with fewer than `many` counted as one; it has a part of [`PARTS`] of those before it, or less.
+    /// How often the number of samples has doubled by the long frame with this index, those with
+    /// fewer than `many` counted as one; it has a part of [`PARTS`] of those before it, or less.
     fn doublings_before(&self, long: u32) -> u32 {
         (long.saturating_sub(PARTS) / PARTS).min(self.doublings)
     }
@@ -114,7 +126,8 @@ impl FrameSamples {
         // all that have fewer have as many together as one
         let frames = frames - self.ramp;
         let doublings = self.doublings_before(frames);
-        // 2 PARTS frames have as many together as PARTS of the next number, and all that follow likewise
+        // 2 PARTS frames have as many together as PARTS of the next number, and all that follow
+        // likewise
         (u64::from(self.many) * u64::from(frames - PARTS * doublings)) << doublings
     }
 
@@ -146,7 +159,8 @@ impl FrameSamples {
         self.forgets_short && self.is_long(resting)
     }
 
-    /// Mean number of samples of a pixel that count in all frames since the image came to rest, but for the first; rounded down.
+    /// Mean number of samples of a pixel that count in all frames since the image came to rest, but
+    /// for the first; rounded down.
     pub fn since_rest(&self, resting: u32) -> u64 {
         let short = resting.min(self.first_long - 1);
         if self.has_forgotten_short(resting) {
@@ -198,10 +212,11 @@ mod tests {
                     assert!(few_or(1 << 26));
                     let (mut sum, mut in_long) = (0, 0);
                     for resting in 1..100 {
-                        let now = samples.of(resting);
+                        let now = samples.in_frame(resting);
                         if samples.is_long(resting) {
                             assert_eq!(samples.in_long_before(resting), in_long);
-                            // a block of the sequence, and a small part of all, or as few as at first
+                            // a block of the sequence, and a small part of all, or as few as at
+                            // first
                             assert!(in_long.is_multiple_of(now), "{samples:?}");
                             let is_part = if now <= samples.many {
                                 in_long == 0 || now <= in_long.max(samples.few)
@@ -231,19 +246,19 @@ mod tests {
         let settings = Settings { converge: true, ..Preset::Balanced.settings() };
         let samples = FrameSamples::of_radiance(&settings, 14_400, true);
         assert_eq!(
-            [0, 1, 2, 3, 4, 18, 19, 26, 27, 1000].map(|resting| samples.of(resting)),
+            [0, 1, 2, 3, 4, 18, 19, 26, 27, 1000].map(|resting| samples.in_frame(resting)),
             [1, 2, 2, 4, 8, 8, 16, 16, 32, 32]
         );
         assert_eq!([samples.frames_for_first(10), samples.frames_for_first(64)], [12, 34]);
         let quality = Settings { converge: true, ..Preset::Quality.settings() };
         let quality = FrameSamples::of_radiance(&quality, 14_400, true);
-        assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.of(resting)), [4, 4, 4, 8, 8, 32]);
+        assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.in_frame(resting)), [4, 4, 4, 8, 8, 32]);
         // a GPU has time for several paths in a large image
         let large = |is_cpu| FrameSamples::of_radiance(&settings, 1920 * 1080, is_cpu);
-        assert_eq!([large(true).of(4), large(false).of(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
+        assert_eq!([large(true).in_frame(4), large(false).in_frame(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
         // all pixels of a pattern have the same number
         let half = FrameSamples::of_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
-        assert_eq!([3, 4, 100].map(|resting| half.of(resting)), [1, 8, 8]);
+        assert_eq!([3, 4, 100].map(|resting| half.in_frame(resting)), [1, 8, 8]);
     }
 
     #[test]

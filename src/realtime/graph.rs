@@ -1,13 +1,13 @@
-//! The frame graph: passes declare which resources they read and write. From these declarations follow memory allocation, barriers,
-//! timings, and which passes are skipped because no input has changed.
+//! The frame graph: passes declare which resources they read and write. From these declarations
+//! follow memory allocation, barriers, timings, and which passes are skipped because no input has
+//! changed.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-use glam::DMat3;
-
 use super::display::Display;
-use super::resources::{Extent, Resource, Resources};
+use super::plan::FramePlan;
+use super::resources::{Extent, Resource, ResourceUse, Resources};
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -34,49 +34,14 @@ pub struct Frame<'a> {
     pub camera: CameraRecord,
     /// Objects that moved since the previous frame.
     pub moved: &'a [MovedRecord],
-    /// Frame index.
-    pub number: u32,
-    /// Where samples lie in their pixels: offset from the centre, pixels.
-    pub offset: [f32; 2],
-    /// The camera or objects have moved since the previous frame.
-    pub has_moved: bool,
+    /// What the frame does.
+    pub plan: &'a FramePlan,
     /// From the space of the previous frame's camera to that of this one's, three rows.
     pub previous_to_camera: [[f32; 4]; 3],
-    /// There is a resolved image of the previous frame.
-    pub has_resolved: bool,
-    /// Samples at rest start anew: the image has not rested before, or those before this frame no longer count.
-    pub rest_starts: bool,
-    /// Each path has a place of its own within its pixel, in place of that of the frame.
-    pub spreads: bool,
-    /// Frames since the image came to rest, this one included; 0: it does not rest.
-    pub resting: u32,
-    /// The frame is a long one ([`super::frame_samples`]).
-    pub is_long: bool,
-    /// Samples of each pixel that is sampled in this frame.
-    pub samples: u32,
-    /// Samples of each pixel that count since the image came to rest, but for the first frame.
-    pub rest_samples: u64,
-    /// Index of the first of this frame's samples in the pixel's sequence. (The passes of ambient visibility in short frames go by [`Frame::number`].)
-    pub first_sample: u32,
-    /// The mean of ambient visibility at rest is denoised in this frame.
-    pub denoises: bool,
-    /// In this frame, or in an earlier one at rest.
-    pub has_denoised: bool,
-    /// Maximum samples of histories of radiance before this frame's.
-    pub most_past: f32,
-    /// The environment map has been turned: its new rotation from world directions to the map's.
-    pub environment_turn: Option<DMat3>,
     /// Address of the frame's `FrameParams`.
     pub params: u64,
     /// The buffer to display, if any.
     pub display: Option<Display>,
-}
-
-impl Frame<'_> {
-    /// Lights or materials have changed.
-    pub fn has_new_light(&self) -> bool {
-        self.most_past.is_finite()
-    }
 }
 
 /// A range of invocations or rays of a pass: `first .. first + count`.
@@ -94,59 +59,11 @@ impl Range {
         vec![Self { first: 0, count }]
     }
 
-    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a group).
+    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a
+    /// group).
     pub fn launches(rays: u32, group: u32, most: u32) -> Vec<Self> {
         let most = (most / group).max(1) * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
-    }
-}
-
-/// The resources that a pass reads and writes: its inputs to barriers, memory allocation and skipping.
-#[derive(Clone, Debug, Default)]
-pub struct ResourceUse {
-    /// Resources read.
-    pub reads: Vec<Resource>,
-    /// Resources of the previous frame that are read.
-    pub previous: Vec<Resource>,
-    /// Resources written, which may be read, too.
-    pub writes: Vec<Resource>,
-    /// Resources among the written ones that are filled with a word first.
-    pub clears: Vec<(Resource, u32)>,
-}
-
-impl ResourceUse {
-    /// Declares resources that are read and written.
-    pub fn new(reads: &[Resource], writes: &[Resource]) -> Self {
-        Self { reads: reads.to_vec(), writes: writes.to_vec(), ..Default::default() }
-    }
-
-    /// Adds resources of the previous frame that are read.
-    pub fn previous(mut self, resources: &[Resource]) -> Self {
-        self.previous.extend(resources);
-        self
-    }
-
-    /// Adds resources that are read.
-    pub fn and_reads(mut self, resources: &[Resource]) -> Self {
-        self.reads.extend(resources);
-        self
-    }
-
-    /// Adds resources that are written if `wanted` is true.
-    pub fn and_writes(mut self, wanted: bool, resources: &[Resource]) -> Self {
-        self.writes.extend(resources.iter().filter(|_| wanted));
-        self
-    }
-
-    /// Adds a resource that is filled with a word first.
-    pub fn clears(mut self, resource: Resource, word: u32) -> Self {
-        self.clears.push((resource, word));
-        self
-    }
-
-    /// All resources of this frame that are read or written.
-    pub fn touched(&self) -> impl Iterator<Item = Resource> + '_ {
-        self.reads.iter().chain(&self.previous).chain(&self.writes).copied()
     }
 }
 
@@ -172,13 +89,15 @@ pub trait Pass {
     /// Those of what it draws.
     fn record(&self, recorder: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()>;
 
-    /// Returns true if the pass submits its work itself, because the host decides in between what comes next: then [`Pass::run`] is called in place of
-    /// [`Pass::record`]. Such a pass is the only one of its stage, and clears its resources itself.
+    /// Returns true if the pass submits its work itself, because the host decides in between what
+    /// comes next: then [`Pass::run`] is called in place of [`Pass::record`]. Such a pass is the
+    /// only one of its stage, and clears its resources itself.
     fn is_run_by_host(&self) -> bool {
         false
     }
 
-    /// Moves the lights that it samples to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    /// Moves the lights that it samples to where they are in `scene`, which is that of the tracer
+    /// in another pose. Returns true if they have moved.
     ///
     /// # Errors
     /// Those of the device; [`Error::Scene`] for lights that need other shaders.
@@ -191,7 +110,8 @@ pub trait Pass {
         0
     }
 
-    /// Runs the pass over a range in submissions of its own, and waits for them. `control` is asked between launches whether to stop. Returns their times.
+    /// Runs the pass over a range in submissions of its own, and waits for them. `control` is asked
+    /// between launches whether to stop. Returns their times.
     ///
     /// # Errors
     /// Those of the device; [`Error::Interrupted`] when `control` says so.
@@ -217,7 +137,8 @@ enum Frames {
     Long,
 }
 
-/// Passes that are recorded one after another for each of several ranges; mostly one pass and one range.
+/// Passes that are recorded one after another for each of several ranges; mostly one pass and one
+/// range.
 pub struct Stage {
     passes: Vec<Box<dyn Pass>>,
     ranges: Vec<Range>,
@@ -246,9 +167,9 @@ impl Stage {
         self.passes.iter().any(|p| p.is_run_by_host())
     }
 
-    /// The resources that its passes read and write without a display.
-    pub fn uses(&self) -> impl Iterator<Item = ResourceUse> + '_ {
-        self.passes.iter().map(|p| p.uses(None))
+    /// Resources that its passes read and write without a display.
+    fn uses(&self) -> Vec<ResourceUse> {
+        self.passes.iter().map(|p| p.uses(None)).collect()
     }
 }
 
@@ -259,28 +180,30 @@ pub struct Graph {
     commands: Commands,
     /// The number of rays, where the host cannot read that of the device.
     ray_count: Option<Buffer>,
-    /// What the frame that has begun, and is not finished, writes.
-    begun: Vec<Resource>,
+    /// Resources that the frame under way writes.
+    unfinished: Vec<Resource>,
 }
 
 impl Graph {
     /// Allocates the resources of the stages.
     pub fn new(device: &Arc<Device>, extent: Extent, stages: Vec<Stage>) -> Result<Self> {
         let mut resources = Resources::new(extent);
-        resources.allocate(device, &stages)?;
+        resources.allocate(device, &stages.iter().map(Stage::uses).collect::<Vec<_>>())?;
         let ray_count = match resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none()) {
             true => Some(Buffer::new(device, "number of rays for the host", 4, Memory::Readback)?),
             false => None,
         };
-        Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count, begun: Vec::new() })
+        Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count, unfinished: Vec::new() })
     }
 
-    /// Adds stages after all others. Returns false if that discarded the contents of all resources: stages that read transient ones have them allocated anew,
-    /// because their memory is another's by then.
+    /// Adds stages after all others. Returns false if that discarded the contents of all resources:
+    /// stages that read transient ones have them allocated anew, because their memory is another's
+    /// by then.
     pub fn extend(&mut self, device: &Arc<Device>, stages: Vec<Stage>) -> Result<bool> {
-        let keeps = !stages.iter().flat_map(Stage::uses).any(|u| u.reads.iter().any(|r| r.is_transient()));
+        let uses: Vec<_> = stages.iter().map(Stage::uses).collect();
+        let keeps = !uses.iter().flatten().any(|u| u.reads.iter().any(|r| r.is_transient()));
         if keeps {
-            self.resources.allocate(device, &stages)?;
+            self.resources.allocate(device, &uses)?;
             self.stages.extend(stages);
             return Ok(true);
         }
@@ -288,12 +211,13 @@ impl Graph {
         // the old memory first
         let extent = self.resources.extent();
         self.resources = Resources::new(extent);
-        self.resources.allocate(device, &self.stages)?;
+        self.resources.allocate(device, &self.stages.iter().map(Stage::uses).collect::<Vec<_>>())?;
         self.invalidate();
         Ok(false)
     }
 
-    /// Rays of the last frame, as the device counted them, or of passes whose number of rays the host knows.
+    /// Rays of the last frame, as the device counted them, or of passes whose number of rays the
+    /// host knows.
     ///
     /// # Errors
     /// Those of the device.
@@ -304,7 +228,8 @@ impl Graph {
         Ok(self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum())
     }
 
-    /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that moved.
+    /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that
+    /// moved.
     ///
     /// # Errors
     /// Those of the passes ([`Pass::move_lights`]).
@@ -323,12 +248,13 @@ impl Graph {
         self.resources.touch(resource);
     }
 
-    /// Chooses the stages to record in this frame: those that read a resource that has changed since they were last recorded, or one of the
-    /// previous frame, and those that write a transient resource. Double-buffered resources that are written again are swapped, so
+    /// Chooses the stages to record in this frame: those that read a resource that has changed
+    /// since they were last recorded, or one of the previous frame, and those that write a
+    /// transient resource. Double-buffered resources that are written again are swapped, so
     /// [`Graph::resources`] is valid for this frame from here on.
     pub fn begin(&mut self, display: Option<&Display>, is_long: bool) -> Vec<usize> {
         let mut recorded = Vec::new();
-        self.begun.clear();
+        self.unfinished.clear();
         let others = if is_long { Frames::Short } else { Frames::Long };
         for (k, stage) in self.stages.iter_mut().enumerate().filter(|(_, s)| s.frames != others) {
             let enabled = || stage.passes.iter().filter(|p| p.is_enabled(display));
@@ -350,42 +276,47 @@ impl Graph {
                     self.resources.swap(resource);
                 }
             }
-            self.begun.append(&mut written);
+            self.unfinished.append(&mut written);
             recorded.push(k);
         }
         recorded
     }
 
-    /// Forgets which stages have run, after a frame that was not finished: the next frame records all of them.
+    /// Forgets which stages have run, after a frame that was not finished: the next frame records
+    /// all of them.
     pub fn invalidate(&mut self) {
         self.stages.iter_mut().for_each(|s| s.versions.clear());
     }
 
-    /// After a frame that was not finished: double-buffered resources are those of the frame before again. What passes add to in place
-    /// ([`Resource::Rest`], [`Resource::RestParts`]) is in pieces.
+    /// After a frame that was not finished: double-buffered resources are those of the frame before
+    /// again. What passes add to in place ([`Resource::Rest`], [`Resource::RestParts`]) is in
+    /// pieces.
     pub fn take_back(&mut self) {
-        for resource in self.begun.drain(..) {
+        for resource in self.unfinished.drain(..) {
             self.resources.swap(resource);
         }
         self.invalidate();
     }
 
-    /// Records, submits and waits for the stages that [`Graph::begin`] chose, or for some of them in their order. Returns the times of passes, in order. With `control` each launch is a submission
-    /// of its own, and it is asked between them whether to stop.
+    /// Records, submits and waits for the stages that [`Graph::begin`] chose, or for some of them
+    /// in their order. Returns the times of passes, in order. With `control` each launch is a
+    /// submission of its own, and it is asked between them whether to stop.
     ///
     /// # Errors
     /// Those of the passes and the device; [`Error::Interrupted`] when `control` says so.
     pub fn run(&mut self, frame: &Frame, stages: &[usize], control: Option<&mut dyn Control>) -> Result<Vec<Timing>> {
+        // parameters of all passes
         let display = frame.display.as_ref();
         for &k in stages {
             for pass in self.stages[k].passes.iter_mut().filter(|p| p.is_enabled(display)) {
                 pass.prepare(frame, &self.resources)?;
             }
         }
+
+        // submissions: a stage of several launches is cut, others go with what is before them
         let launches: Vec<(usize, usize)> =
             stages.iter().flat_map(|&s| (0..self.stages[s].ranges.len()).map(move |k| (s, k))).collect();
         let (mut timings, resources) = (Vec::new(), &self.resources);
-        // a stage of several launches is cut, others go with what is before them
         let mut rest = launches.as_slice();
         let mut control = control;
         while !rest.is_empty() {
@@ -406,6 +337,8 @@ impl Graph {
             {
                 return Err(Error::Interrupted);
             }
+
+            // a pass that submits its work itself
             if let &[(stage, k)] = submission
                 && by_host(stage)
             {
@@ -416,6 +349,8 @@ impl Graph {
                 }
                 continue;
             }
+
+            // all others; with the last one the host is told how many rays there were
             let mut outcome = Ok(());
             let counted = self.ray_count.as_ref().filter(|_| rest.is_empty()).zip(resources.buffer(Resource::RayCount));
             timings.extend(self.commands.run(|r| {
@@ -435,7 +370,7 @@ impl Graph {
 
     /// After a frame whose stages have all run: it cannot be taken back any more.
     pub fn finish(&mut self) {
-        self.begun.clear();
+        self.unfinished.clear();
     }
 }
 
@@ -476,7 +411,8 @@ struct Hazards {
 }
 
 impl Hazards {
-    /// Records a barrier if what follows reads a written buffer, or writes a read or written one; then notes what follows.
+    /// Records a barrier if what follows reads a written buffer, or writes a read or written one;
+    /// then notes what follows.
     fn before(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
         if self.conflicts(reads, writes) {
             r.barrier();

@@ -1,13 +1,14 @@
-//! Histories of a pipeline of another size, so that an image whose resolution changes does not begin with noise.
+//! Histories of a pipeline of another size, so that an image whose resolution changes does not
+//! begin with noise.
 
-use super::graph::Params;
+use super::Realtime;
 use super::resources::Resource;
-use super::settings::Technique;
-use super::{FrameParams, Realtime, State};
+use super::seen::SeenSurfaces;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory};
-use crate::interface::records::passes::{ResampleParams, SeenParams};
+use crate::gpu::{Buffer, Commands};
+use crate::interface::records::frame::FrameParams;
+use crate::interface::records::passes::ResampleParams;
 use crate::shaders::{self, LANES};
 use crate::tracer::{Push, Tracer};
 
@@ -21,25 +22,30 @@ const REMEMBERED: [Resource; 6] = [
     Resource::ResolvedHistory,
 ];
 
-/// Share of the surfaces in view from which on own histories, of an image at rest, are the better ones: coarser ones are of motion, and so noisier. Of what own ones lack, mirrors and glass mostly, the
-/// others know little more.
+/// Share of the surfaces in view from which on own histories, of an image at rest, are the better
+/// ones: coarser ones are of motion, and so noisier. Of what own ones lack, mirrors and glass
+/// mostly, the others know little more.
 const SEEN_ENOUGH: f64 = 0.75;
 
-/// Largest side of images that are resampled, pixels: products of two are numbers of 32 bits in the shader.
+/// Largest side of images that are resampled, pixels: products of two are numbers of 32 bits in the
+/// shader.
 const MAX_SIDE: u32 = 1 << 15;
 
 impl Realtime {
-    /// Has the next frame continue those of `other`, a pipeline of the same scene, tracer and settings, and mostly of another size: each pixel has the histories of the nearest pixel
-    /// there. Samples at rest start anew. Returns false, and changes nothing, where `other` has no histories or they are of another kind, and for sides of more than 2^15 pixels; with `keeps_own` also where this pipeline has histories of
-    /// its own of most surfaces that the other's last frame shows.
+    /// Has the next frame continue those of `other`, a pipeline of the same scene, tracer and
+    /// settings, and mostly of another size: each pixel has the histories of the nearest pixel
+    /// there. Samples at rest start anew. Returns false, and changes nothing, where `other` has no
+    /// histories or they are of another kind, and for sides of more than 2^15 pixels; with
+    /// `keeps_own` also where this pipeline has histories of its own of most surfaces that the
+    /// other's last frame shows.
     ///
     /// # Errors
     /// Those of the device.
     pub fn continue_from(&mut self, tracer: &Tracer, other: &Self, keeps_own: bool) -> Result<bool> {
-        let Some(camera) = other.state.camera.filter(|_| other.state.has_history) else { return Ok(false) };
-        let is_like = self.is_radiance == other.is_radiance && self.settings.technique == other.settings.technique;
+        let Some(camera) = other.history.camera.filter(|_| other.history.has_history) else { return Ok(false) };
+        let is_like = self.channels() == other.channels() && self.settings.technique == other.settings.technique;
         let is_wide = self.size.iter().chain(&other.size).any(|n| *n > MAX_SIDE);
-        if !is_like || is_wide || self.settings.technique == Technique::Larsen {
+        if !is_like || is_wide || !self.signal.has_pixel_histories() {
             return Ok(false);
         }
         if keeps_own && self.share_seen(tracer, other, &camera)? >= SEEN_ENOUGH {
@@ -68,21 +74,14 @@ impl Realtime {
             }
         })?;
         self.graph.invalidate();
-        self.state = State {
-            has_resolved: other.state.has_resolved && images.contains(&Resource::ResolvedHistory),
-            has_new_light: self.state.has_new_light || other.state.has_new_light,
-            environment_turn: self.state.environment_turn.take(),
-            resting: 0,
-            // samples at rest are not taken over
-            was_interrupted: true,
-            ..other.state.clone()
-        };
+        self.history = self.history.continued_from(&other.history, images.contains(&Resource::ResolvedHistory));
         Ok(true)
     }
 
-    /// Share of the surfaces in the last frame of `other`, by this camera, of which this pipeline has histories; 0 if it has none.
+    /// Share of the surfaces in the last frame of `other`, by this camera, of which this pipeline
+    /// has histories; 0 if it has none.
     fn share_seen(&mut self, tracer: &Tracer, other: &Self, camera: &CameraRecord) -> Result<f64> {
-        if !self.state.has_history || self.state.camera.is_none() {
+        if !self.history.has_history || self.history.camera.is_none() {
             return Ok(0.0);
         }
         let (ours, theirs) = (self.graph.resources(), other.graph.resources());
@@ -92,51 +91,10 @@ impl Realtime {
             normals: theirs.address(Resource::Normals),
             previous_guide: ours.address(Resource::Guide),
             previous_position: 0,
-            ..self.frame_params(camera, false, other.state.offset)
+            ..self.frame_params(camera, false, other.history.offset)
         };
         // of the next frame, which is not yet there
         self.params.write(&frame)?;
         SeenSurfaces::new(tracer)?.share(self.params.address(), other.pixels() as u32, 1)
-    }
-}
-
-/// Counts surfaces that an image shows, and those of them that the last frame of this or another pipeline shows as well.
-pub struct SeenSurfaces {
-    pipeline: ComputePipeline,
-    params: Params<SeenParams>,
-    counts: Buffer,
-    commands: Commands,
-}
-
-impl SeenSurfaces {
-    /// Compiles the pass.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn new(tracer: &Tracer) -> Result<Self> {
-        let device = tracer.device();
-        Ok(Self {
-            pipeline: shaders::SEEN.pipeline(device)?,
-            params: Params::new(device, "parameters of surfaces seen")?,
-            counts: Buffer::new(device, "surfaces seen", 8, Memory::Readback)?,
-            commands: Commands::new(device)?,
-        })
-    }
-
-    /// Share of the surfaces in one of `stride` pixels of an image that the frame before shows; 1 where there are none. `frame`: address of `FrameParams` whose G-buffer is that of the image.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn share(&mut self, frame: u64, pixels: u32, stride: u32) -> Result<f64> {
-        self.params.write(&SeenParams { frame, counts: self.counts.address(), stride, reserved: 0 })?;
-        let push = Push { pass: self.params.address(), count: pixels.div_ceil(stride), ..Default::default() };
-        self.commands.run(|r| {
-            r.fill(&self.counts, 8, 0);
-            r.barrier();
-            r.dispatch(&self.pipeline, &push, push.count.div_ceil(LANES));
-        })?;
-        let [surfaces, seen]: [u32; 2] = bytemuck::pod_read_unaligned(&self.counts.read(0, 8)?);
-        // an empty view has nothing to lack
-        Ok(if surfaces == 0 { 1.0 } else { f64::from(seen) / f64::from(surfaces) })
     }
 }

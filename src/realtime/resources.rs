@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::graph::Stage;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::denoise::RadianceRecord;
@@ -83,7 +82,8 @@ pub enum Resource {
     DiffuseHistory,
     /// Radiance: accumulated rest.
     SpecularHistory,
-    /// Radiance: estimates between the steps of a filter, two buffers used alternately for diffuse reflection, and two for the rest.
+    /// Radiance: estimates between the steps of a filter, two buffers used alternately for diffuse
+    /// reflection, and two for the rest.
     FilteredRadiance(usize),
     /// Radiance: the filtered image.
     Composed,
@@ -114,7 +114,8 @@ pub enum Resource {
 enum Lifetime {
     /// On the host, or in the tracer's memory: no buffer is allocated.
     Host,
-    /// From its first pass to its last in a frame: resources whose lifetimes do not overlap share memory.
+    /// From its first pass to its last in a frame: resources whose lifetimes do not overlap share
+    /// memory.
     Frame,
     /// Until it is written again.
     Kept,
@@ -127,8 +128,6 @@ enum Lifetime {
 pub struct Extent {
     /// Number of pixels.
     pub pixels: u64,
-    /// Number of pixels, including those that fill up 8x8 tiles.
-    pub tiled_pixels: u64,
     /// Number of pixels at half resolution per axis.
     pub half_pixels: u64,
     /// Maximum rays of a launch.
@@ -145,8 +144,9 @@ struct Description {
 impl Resource {
     fn describe(self, extent: &Extent) -> Description {
         use Lifetime::{Frame, Host, Kept, Pair};
-        let Extent { pixels, tiled_pixels, half_pixels, launch_rays } = *extent;
-        // all in the device's memory, also what the host reads: a GPU takes ten times as long to write to the host's, pixel by pixel
+        let Extent { pixels, half_pixels, launch_rays } = *extent;
+        // all in the device's memory, also what the host reads: a GPU takes ten times as long to
+        // write to the host's, pixel by pixel
         let device = |name, bytes, lifetime| Description { name, bytes, lifetime };
         match self {
             Self::Camera | Self::Scene | Self::FrameNumber | Self::DisplaySettings => device("host", 0, Host),
@@ -202,10 +202,60 @@ impl Resource {
     }
 }
 
+/// Resources that a pass reads and writes: barriers, memory and skipping follow from them.
+#[derive(Clone, Debug, Default)]
+pub struct ResourceUse {
+    /// Resources read.
+    pub reads: Vec<Resource>,
+    /// Resources of the previous frame that are read.
+    pub previous: Vec<Resource>,
+    /// Resources written, which may be read, too.
+    pub writes: Vec<Resource>,
+    /// Resources among the written ones that are filled with a word first.
+    pub clears: Vec<(Resource, u32)>,
+}
+
+impl ResourceUse {
+    /// Declares resources that are read and written.
+    pub fn new(reads: &[Resource], writes: &[Resource]) -> Self {
+        Self { reads: reads.to_vec(), writes: writes.to_vec(), ..Default::default() }
+    }
+
+    /// Adds resources of the previous frame that are read.
+    pub fn previous(mut self, resources: &[Resource]) -> Self {
+        self.previous.extend(resources);
+        self
+    }
+
+    /// Adds resources that are read.
+    pub fn and_reads(mut self, resources: &[Resource]) -> Self {
+        self.reads.extend(resources);
+        self
+    }
+
+    /// Adds resources that are written if `wanted` is true.
+    pub fn and_writes(mut self, wanted: bool, resources: &[Resource]) -> Self {
+        self.writes.extend(resources.iter().filter(|_| wanted));
+        self
+    }
+
+    /// Adds a resource that is filled with a word first.
+    pub fn clears(mut self, resource: Resource, word: u32) -> Self {
+        self.clears.push((resource, word));
+        self
+    }
+
+    /// All resources of this frame that are read or written.
+    pub fn touched(&self) -> impl Iterator<Item = Resource> + '_ {
+        self.reads.iter().chain(&self.previous).chain(&self.writes).copied()
+    }
+}
+
 /// A resource that has a buffer.
 struct Entry {
     resource: Resource,
-    /// Indices of its buffers: one, or with [`Lifetime::Pair`] this frame's and the previous frame's.
+    /// Indices of its buffers: one, or with [`Lifetime::Pair`] this frame's and the previous
+    /// frame's.
     buffers: [usize; 2],
     /// Incremented whenever it is written.
     version: u64,
@@ -231,12 +281,15 @@ impl Resources {
         self.extent
     }
 
-    /// Allocates buffers of resources that these stages write and that have none yet. A resource that no pass writes has no buffer, and the address 0.
-    pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Stage]) -> Result<()> {
-        // for each resource the first and the last stage that uses it, in the order in which they are first written
+    /// Allocates buffers of resources that stages write and that have none yet. `stages` has the
+    /// uses of each stage's passes. A resource that no pass writes has no buffer, and the address
+    /// 0.
+    pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Vec<ResourceUse>]) -> Result<()> {
+        // for each resource the first and the last stage that uses it, in the order in which they
+        // are first written
         let mut spans: Vec<(Resource, [usize; 2])> = Vec::new();
         for (k, stage) in stages.iter().enumerate() {
-            for uses in stage.uses() {
+            for uses in stage {
                 for &resource in &uses.writes {
                     let is_new = self.buffer_index(resource).is_none() && !spans.iter().any(|s| s.0 == resource);
                     if is_new && resource.describe(&self.extent).lifetime != Lifetime::Host {
@@ -248,8 +301,11 @@ impl Resources {
                 }
             }
         }
+
         // buffers of transient resources, with the last stage that uses them
         let mut shared: Vec<(usize, u64, usize)> = Vec::new();
+
+        // a buffer each, or that of a transient resource which is no longer used by then
         for (resource, [first, last]) in spans {
             let Description { name, bytes, lifetime } = resource.describe(&self.extent);
             let free = shared.iter_mut().find(|s| lifetime == Lifetime::Frame && s.1 == bytes && s.2 < first);

@@ -1,12 +1,13 @@
-//! `antialias`: the mean over frames whose samples lie at different places within the pixels, and at rest what the image converges to.
+//! `antialias`: the mean over frames whose samples lie at different places within the pixels, and
+//! at rest what the image converges to.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::interface::records::radiance::AntialiasParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
 use crate::realtime::params::{MAX_MOVED, MovedRecord};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
@@ -18,8 +19,9 @@ const RADIANCE_FRAMES: f32 = 4.0;
 const STILL_FRAMES: f32 = 16.0;
 /// The same after lights or materials have changed.
 const NEW_LIGHT_FRAMES: f32 = 2.0;
-/// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs from the one before by the edges that its filter sees.
-const LEAST_WEIGHT: f32 = 0.25;
+/// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs
+/// from the one before by the edges that its filter sees.
+const MIN_WEIGHT: f32 = 0.25;
 /// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
 const CLAMP_WIDTH: f32 = 1.25;
 
@@ -46,12 +48,17 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Number of samples as which each frame in motion counts at rest: 8 where the history has its maximum number of frames.
+/// Number of samples as which each frame in motion counts at rest: 8 where the history has its
+/// maximum number of frames.
 const MOTION_SAMPLES: f32 = 8.0 / RADIANCE_FRAMES;
 
-/// How much a long frame of radiance at rest counts, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
-/// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
-/// specks. Where samples are many there are none, and frames that add a constant part would leave sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth, 1.01 by the twenty-fourth.
+/// How much a long frame of radiance at rest counts, which is the filtered mean of all samples so
+/// far: those before it are of a part r of its samples. By the third power of that part they soften
+/// what the filter does at edges and hide its specks, and the mean has nearly the noise of all
+/// samples: by the square 1.07 times that after four long frames, by higher powers less, and more
+/// specks. Where samples are many there are none, and frames that add a constant part would leave
+/// sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth, 1.01 by
+/// the twenty-fourth.
 struct LongFrame {
     before: f32,
     after: f32,
@@ -59,10 +66,10 @@ struct LongFrame {
 }
 
 impl LongFrame {
-    fn of(frame: &Frame) -> Option<Self> {
-        let after = frame.rest_samples as f32;
-        (frame.is_long && after > 0.0).then(|| Self {
-            before: (after - frame.samples as f32).max(0.0),
+    fn from_frame(frame: &Frame) -> Option<Self> {
+        let after = frame.plan.progress.rest_samples as f32;
+        (frame.plan.progress.is_long && after > 0.0).then(|| Self {
+            before: (after - frame.plan.progress.samples as f32).max(0.0),
             after,
             power: (after / 16.0).clamp(3.0, 24.0),
         })
@@ -83,12 +90,15 @@ impl Pass for Antialias {
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        // which image it resolves, and how a long frame counts
         self.moved.write(0, bytemuck::cast_slice(frame.moved))?;
         let input = resources.address(self.input);
         let is_composed = self.input == Resource::Composed;
         let is_light_at_rest = is_composed && self.has_rest;
-        let long = LongFrame::of(frame).filter(|_| is_light_at_rest);
+        let long = LongFrame::from_frame(frame).filter(|_| is_light_at_rest);
         let of_long = |f: fn(&LongFrame) -> f32| long.as_ref().map_or(0.0, f);
+
+        // how many frames it averages follows from the signal and from what has changed
         self.params.write(&AntialiasParams {
             previous_to_camera: frame.previous_to_camera,
             frame: frame.params,
@@ -97,33 +107,33 @@ impl Pass for Antialias {
             history: resources.address(Resource::ResolvedHistory),
             previous_history: resources.previous_address(Resource::ResolvedHistory),
             rest: resources.address(Resource::Rest),
-            denoised: if frame.has_denoised { resources.address(Resource::Denoised) } else { 0 },
+            denoised: if frame.plan.has_denoised { resources.address(Resource::Denoised) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             moved: self.moved.address(),
-            changed: match is_composed && (frame.has_new_light() || !frame.moved.is_empty()) {
+            changed: match is_composed && (frame.plan.has_new_light() || !frame.moved.is_empty()) {
                 true => resources.address(Resource::DiffuseHistory),
                 false => 0,
             },
             moved_count: frame.moved.len() as u32,
-            uncovers: frame.has_moved.into(),
-            has_history: frame.has_resolved.into(),
+            uncovers: frame.plan.has_moved.into(),
+            has_history: frame.plan.has_resolved.into(),
             most_frames: match frame.settings.antialias {
-                true if frame.has_new_light() => NEW_LIGHT_FRAMES,
+                true if frame.plan.has_new_light() => NEW_LIGHT_FRAMES,
                 true if is_composed => RADIANCE_FRAMES,
                 true => MAX_FRAMES,
                 false => 1.0,
             },
-            most_still_frames: if frame.has_new_light() { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
+            most_still_frames: if frame.plan.has_new_light() { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
             reserved: 0.0,
-            samples_at: if frame.spreads { [0.0; 2] } else { frame.offset },
+            samples_at: if frame.plan.placement.spreads { [0.0; 2] } else { frame.plan.offset },
             clamp_width: CLAMP_WIDTH,
-            holds: (!is_composed && frame.is_long).into(),
-            resting: frame.resting as f32,
+            holds: (!is_composed && frame.plan.progress.is_long).into(),
+            resting: frame.plan.progress.motion.frames_at_rest() as f32,
             rest_before: of_long(|l| l.before),
             rest_after: of_long(|l| l.after),
             motion_samples: MOTION_SAMPLES,
             power: of_long(|l| l.power),
-            least_weight: if is_light_at_rest { LEAST_WEIGHT } else { 0.0 },
+            least_weight: if is_light_at_rest { MIN_WEIGHT } else { 0.0 },
         })
     }
 

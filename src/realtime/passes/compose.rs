@@ -4,8 +4,8 @@ use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::radiance::ComposeParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 

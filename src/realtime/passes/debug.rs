@@ -1,5 +1,6 @@
-//! Debug views: passes that write the displayed image themselves. They are compiled and run only for frames that show them, and no other pass reads what
-//! they write. Each is a file here and a variant of [`DisplayMode`], which [`super::debug_view`] brings together.
+//! Debug views: passes that write the displayed image themselves. They are compiled and run only
+//! for frames that show them, and no other pass reads what they write. Each is a file here and a
+//! variant of [`DisplayMode`], which [`super::debug_view`] brings together.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
@@ -7,8 +8,8 @@ use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::DisplayMode;
 use crate::interface::records::passes::DebugParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::ComputeShader;
 use crate::tracer::Tracer;

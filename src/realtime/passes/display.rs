@@ -1,15 +1,16 @@
-//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and without alpha for files.
+//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and
+//! without alpha for files.
 
 use super::debug_view;
 use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
-pub use crate::interface::DisplayMode;
-use crate::interface::ToneMap;
+use crate::interface::DisplayMode;
 use crate::interface::records::display::{DISPLAY_RADIANCE, DisplayParams};
 use crate::output::png::Colour;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::{Settings, Technique};
 use crate::shaders;
 use crate::tracer::Tracer;
@@ -67,19 +68,6 @@ pub fn bent_normals_disabled() -> Error {
     Error::Usage("bent normals are not computed: enable them in the settings".into())
 }
 
-/// What is displayed, and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Display {
-    /// Buffer to display.
-    pub shown: DisplayMode,
-    /// Exposure in stops: 0 unchanged, 1 twice as bright.
-    pub exposure: f32,
-    /// Length by which depths and positions are divided, scene units.
-    pub unit: f32,
-    /// Tone mapping operator of radiance.
-    pub tone_map: ToneMap,
-}
-
 struct DisplayPass {
     shows_rays: bool,
     pipeline: ComputePipeline,
@@ -87,8 +75,8 @@ struct DisplayPass {
     thresholds: Buffer,
 }
 
-/// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose input keeps its memory until this pass; else for all
-/// other buffers.
+/// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose
+/// input keeps its memory until this pass; else for all other buffers.
 pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = DisplayPass {

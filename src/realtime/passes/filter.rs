@@ -1,4 +1,5 @@
-//! `filter`: averages over neighbours on the same surface, in one step or several, and turns estimates into the result.
+//! `filter`: averages over neighbours on the same surface, in one step or several, and turns
+//! estimates into the result.
 
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::constants;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;

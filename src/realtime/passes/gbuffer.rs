@@ -1,5 +1,5 @@
-//! `gbuffer`: the surface at each pixel's centre, by camera rays that are traced or rasterized. It is skipped while neither the camera nor
-//! the scene changes.
+//! `gbuffer`: the surface at each pixel's centre, by camera rays that are traced or rasterized. It
+//! is skipped while neither the camera nor the scene changes.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
@@ -7,8 +7,8 @@ use crate::gpu::Recorder;
 use crate::integrators::ao::Hemisphere;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::Tracer;
@@ -46,7 +46,7 @@ impl Pass for Gbuffer {
         self.params.write(&BlockParams {
             hemisphere: self.has_axes.into(),
             frame: frame.params,
-            centre_offset: frame.offset,
+            centre_offset: frame.plan.offset,
             ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
         })
     }
@@ -57,7 +57,7 @@ impl Pass for Gbuffer {
                 camera: frame.camera,
                 image_size: frame.block.size,
                 block: frame.block,
-                at: frame.offset.map(|x| 0.5 + x),
+                at: frame.plan.offset.map(|x| 0.5 + x),
             };
             self.rays.draw(r, frame.tracer, &view)?;
         }

@@ -1,7 +1,8 @@
-//! The pipeline that Larsen (2019) measured, as the paper describes it: half resolution per axis, 64 closest-hit rays from one rotated
-//! table of points, occlusion only where no point light is visible, a 3x3 box filter without edge tests, and half of the previous frame.
-//! Where the paper is silent, the choice favours it: the geometric normal, a bias and a ray length that fit the scene's scale
-//! ([`Settings::unit`]), white surfaces.
+//! The pipeline that Larsen (2019) measured, as the paper describes it: half resolution per axis,
+//! 64 closest-hit rays from one rotated table of points, occlusion only where no point light is
+//! visible, a 3x3 box filter without edge tests, and half of the previous frame. Where the paper is
+//! silent, the choice favours it: the geometric normal, a bias and a ray length that fit the
+//! scene's scale ([`Settings::unit`]), white surfaces.
 
 use std::sync::Arc;
 
@@ -10,8 +11,8 @@ use crate::film::block::Block;
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
 use crate::interface::records::larsen::{LARSEN_NOISE, LARSEN_RAYS, LarsenParams};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::{FilterKind, Settings};
 use crate::sampling::{best_candidates, blue_noise};
 use crate::shaders::{self, LANES};
@@ -41,8 +42,10 @@ struct Larsen {
     params: Params<LarsenParams>,
 }
 
-/// The passes after the G-buffer, for an image of `size` pixels. `lights`: positions of point lights relative to the scene's origin.
+/// The passes after the G-buffer, for an image of `size` pixels. `lights`: positions of point
+/// lights relative to the scene's origin.
 pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Vec<Stage>> {
+    // what the passes share: lights, points of the hemisphere, noise that turns them
     let device = tracer.device();
     let half = size.map(|n| n.div_ceil(2));
     let light_records: Vec<[f32; 4]> = lights.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
@@ -62,6 +65,8 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
         ..Default::default()
     };
     let shared = Arc::new(Shared { params, _tables: tables });
+
+    // the stages
     let pass = |work| -> Result<Box<dyn Pass>> {
         Ok(Box::new(Larsen { work, shared: shared.clone(), params: Params::new(device, "parameters of Larsen's pipeline")? }))
     };
@@ -106,7 +111,7 @@ impl Pass for Larsen {
         self.params.write(&LarsenParams {
             frame: frame.params,
             // the frame index that rotates the table alternates between two values, as in the paper
-            frame_parity: frame.number & 1,
+            frame_parity: frame.plan.number & 1,
             lit: resources.address(Resource::VisibleLights),
             samples: resources.address(Resource::Samples),
             occlusion: resources.address(Resource::Occlusion),

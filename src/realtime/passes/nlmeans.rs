@@ -1,23 +1,20 @@
-//! `nlmeans`: non-local means of all samples of ambient visibility since the image came to rest, after `rest_noise`, which says how well each pixel is known. Stills are denoised by the same shaders
-//! ([`crate::denoise`]).
+//! `nlmeans`: non-local means of all samples of ambient visibility since the image came to rest,
+//! after `rest_noise`, which says how well each pixel is known. Stills are denoised by the same
+//! shaders ([`crate::denoise`]).
 
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::denoise::{NLMEANS_BLOCK, NLMEANS_RADIANCE_BLOCK, NlMeansParams};
 use crate::interface::records::radiance::RestNoiseParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, ComputeShader};
 use crate::tracer::Tracer;
 
-/// Minimum number of frames at rest before they are filtered, and of samples of a pixel: of fewer too little is known of their noise.
-pub const MIN_FRAMES: u32 = 4;
-/// The samples.
-pub const MIN_SAMPLES: u64 = 8;
-
-/// Assumed convergence of samplers: the variance of the mean of n samples falls as `n^-(1 + EVENNESS)`. Of 64 samples of ambient occlusion it is between a half and 1.5 times
-/// that in six scenes (docs/denoising.md); weights need to know it no better.
+/// Assumed convergence of samplers: the variance of the mean of n samples falls as
+/// `n^-(1 + EVENNESS)`. Of 64 samples of ambient occlusion it is between a half and 1.5 times that in
+/// six scenes (docs/denoising.md); weights need to know it no better.
 pub const EVENNESS: f32 = 0.33;
 
 /// The shader for images of so many channels, 1 or 3.
@@ -31,7 +28,8 @@ pub fn blocks(size: [u32; 2], channels: u32) -> u32 {
     size[0].div_ceil(side) * size[1].div_ceil(side)
 }
 
-/// The shader's parameters. `from`, `to`: addresses of the images that it reads and writes; `depths`: of the pixels' depths, or 0.
+/// The shader's parameters. `from`, `to`: addresses of the images that it reads and writes;
+/// `depths`: of the pixels' depths, or 0.
 pub fn params(size: [u32; 2], channels: u32, [from, to, depths]: [u64; 3]) -> NlMeansParams {
     // noise of radiance differs more from pixel to pixel
     let sameness = if channels == 1 { 1.0 } else { 2.0 };
@@ -80,7 +78,7 @@ impl Pass for Noise {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
-        if frame.denoises {
+        if frame.plan.denoises {
             self.params.dispatch(r, "rest_noise", &self.pipeline, frame, range);
         }
         Ok(())
@@ -98,7 +96,7 @@ impl Pass for NlMeans {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
-        if frame.denoises {
+        if frame.plan.denoises {
             self.params.dispatch(r, "nlmeans", &self.pipeline, frame, range);
         }
         Ok(())

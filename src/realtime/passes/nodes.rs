@@ -1,4 +1,5 @@
-//! `nodes`: a heat map of the BVH nodes that camera rays visit with the compute tracer. It has its own traversal kernel.
+//! `nodes`: a heat map of the BVH nodes that camera rays visit with the compute tracer. It has its
+//! own traversal kernel.
 
 use super::debug::DebugView;
 use crate::error::Result;

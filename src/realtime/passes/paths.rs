@@ -1,4 +1,5 @@
-//! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
+//! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts.
+//! The host reads after some bounces how many paths are left.
 
 use std::sync::Arc;
 
@@ -12,8 +13,8 @@ use crate::interface::PixelFilter;
 use crate::interface::records::radiance::GatherParams;
 use crate::realtime::Settings;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::scene::Scene;
 use crate::tracer::{Push, Tracer};
 
@@ -32,7 +33,8 @@ struct Paths {
     has_rest: bool,
 }
 
-/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)).
+/// The pass over the pixels that are sampled in a frame
+/// ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)).
 pub fn stage(
     tracer: &Tracer,
     paths: SignalPaths,
@@ -41,7 +43,8 @@ pub fn stage(
     settings: &Settings,
     has_rest: bool,
 ) -> Result<Stage> {
-    // a range is a launch, or several of the same pixels; beyond it there is room for paths of uncovered pixels
+    // a range is a launch, or several of the same pixels; beyond it there is room for paths of
+    // uncovered pixels
     let pixels = settings.launch_rays.min(paths.capacity()) / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
     let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
     let gather = || Params::new(tracer.device(), "parameters of gathering");
@@ -72,12 +75,12 @@ impl Pass for Paths {
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
-        if let Some(to_map) = &frame.environment_turn {
+        if let Some(to_map) = &frame.plan.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
-        let pixel_filter = if frame.spreads { PixelFilter::Box } else { PixelFilter::Centre };
+        let pixel_filter = if frame.plan.placement.spreads { PixelFilter::Box } else { PixelFilter::Centre };
         // paths that lie where the G-buffer's rays do begin at what those hit
-        let begins_at_known = !frame.spreads && self.paths.can_begin_at_known();
+        let begins_at_known = !frame.plan.placement.spreads && self.paths.can_begin_at_known();
         let params = BlockParams {
             known_hits: if begins_at_known { resources.address(Resource::KnownHits) } else { 0 },
             pixel_filter: pixel_filter as u32,
@@ -85,7 +88,7 @@ impl Pass for Paths {
             listed: self.uncovered.as_ref().map_or(0, |(u, _)| u.address()),
             ..super::surfaces::block_params(frame, self.sampled)
         };
-        let rr_depth = if frame.is_long { frame.settings.rest_rr_depth } else { 0 };
+        let rr_depth = if frame.plan.progress.is_long { frame.settings.rest_rr_depth } else { 0 };
         self.paths.begin(&frame.camera, &params, rr_depth)
     }
 
@@ -109,21 +112,24 @@ impl Pass for Paths {
         range: Range,
         mut control: Option<&mut dyn Control>,
     ) -> Result<Vec<Timing>> {
+        // pixels that the frame uncovers have more paths, with the last launch
         let mut timings = Vec::new();
         let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
-        // with the last launch
         let has_uncovered = Uncovered::are_listed(frame) && range.first + range.count == self.sampled.rays();
         let uncovered = match &self.uncovered {
             Some((uncovered, _)) if has_uncovered => uncovered.counts()?,
             _ => Counts::default(),
         };
-        for (earlier, sample_bits) in sample_batches(frame.samples, most_bits) {
+
+        for (earlier, sample_bits) in sample_batches(frame.plan.progress.samples, most_bits) {
             if earlier > 0
                 && let Some(control) = &mut control
                 && control.should_stop()?
             {
                 return Err(Error::Interrupted);
             }
+
+            // paths of all pixels of the range
             let gathered = GatherParams {
                 frame: frame.params,
                 path: self.paths.params_address(),
@@ -132,7 +138,7 @@ impl Pass for Paths {
                 distances: resources.address(Resource::ReflectedDistance),
                 rest: resources.address(Resource::Rest),
                 rest_parts: resources.address(Resource::RestParts),
-                starts: frame.rest_starts.into(),
+                starts: frame.plan.progress.starts_anew.into(),
                 earlier,
                 tiles_x: self.sampled.tiles_x(),
                 ..Default::default()
@@ -142,18 +148,20 @@ impl Pass for Paths {
                 scene: frame.tracer.scene_address(),
                 first: range.first << sample_bits,
                 count: range.count << sample_bits,
-                sample_index: frame.first_sample.wrapping_add(earlier),
+                sample_index: frame.plan.placement.first_sample.wrapping_add(earlier),
                 sample_bits,
                 ..Default::default()
             };
             let mut gathers = vec![Push { pass: self.gather.address(), ..push }];
+
+            // and more of those that are listed
             if let Some((list, gather)) = &mut self.uncovered
-                && earlier + (1 << sample_bits) == frame.samples
+                && earlier + (1 << sample_bits) == frame.plan.progress.samples
                 && let Some(bits) = uncovered.listed_bits(sample_bits, self.paths.capacity() - push.count)
             {
                 self.paths.list(bits)?;
                 // samples at rest are as many for all pixels
-                let (rest, rest_parts, earlier) = (0, 0, frame.samples);
+                let (rest, rest_parts, earlier) = (0, 0, frame.plan.progress.samples);
                 let first_path = push.count;
                 gather.write(&GatherParams { listed: list.address(), first_path, earlier, rest, rest_parts, ..gathered })?;
                 let sample_bits = sample_bits + bits;

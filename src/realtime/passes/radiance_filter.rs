@@ -1,4 +1,5 @@
-//! `radiance_filter`: averages diffuse reflection, and then the rest, over neighbours on the same surface (the shader `denoise`, with which stills are denoised).
+//! `radiance_filter`: averages diffuse reflection, and then the rest, over neighbours on the same
+//! surface (the shader `denoise`, with which stills are denoised).
 
 use std::sync::Arc;
 
@@ -7,14 +8,15 @@ use crate::film::block::Block;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// At rest the box has so many pixels at least, however many samples they have: what detail is, and what noise, is told by them.
-const LEAST_PIXELS: f32 = 9.0;
+/// At rest the box has so many pixels at least, however many samples they have: what detail is, and
+/// what noise, is told by them.
+const MIN_PIXELS: f32 = 9.0;
 
 /// One step of the filter of one part.
 struct RadianceFilter {
@@ -25,7 +27,9 @@ struct RadianceFilter {
     to: Resource,
 }
 
-/// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the rest is black and is left alone), and the images that hold the results: diffuse reflection and the rest.
+/// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the
+/// rest is black and is left alone), and the images that hold the results: diffuse reflection and
+/// the rest.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::DENOISE.specialized(device, &settings.filter.specialization())?);
@@ -54,7 +58,7 @@ impl Pass for RadianceFilter {
             frame: frame.params,
             from: resources.address(self.from),
             to: resources.address(self.to),
-            samples: frame.settings.filter.samples.max(LEAST_PIXELS * frame.rest_samples as f32),
+            samples: frame.settings.filter.samples.max(MIN_PIXELS * frame.plan.progress.rest_samples as f32),
             ..self.step.params()
         })
     }

@@ -1,16 +1,18 @@
-//! `radiance_temporal`: adds this frame's samples of diffuse reflection, and of the rest, to the reprojected histories of the same surface.
+//! `radiance_temporal`: adds this frame's samples of diffuse reflection, and of the rest, to the
+//! reprojected histories of the same surface.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::interface::records::radiance::RadianceTemporalParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
 use crate::realtime::params::{MAX_MOVED, MovedRecord};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// Half width of history clamping, in standard deviations of the samples nearby, relative to [`crate::realtime::Settings::clamp`].
+/// Half width of history clamping, in standard deviations of the samples nearby, relative to
+/// [`crate::realtime::Settings::clamp`].
 const CLAMP_SCALE: f32 = 0.5;
 
 struct RadianceTemporal {
@@ -78,7 +80,7 @@ impl Pass for RadianceTemporal {
             moved_count: frame.moved.len() as u32,
             moved_weight: frame.settings.moved_weight,
             clamp_width: CLAMP_SCALE * frame.settings.clamp,
-            most_past: frame.most_past,
+            most_past: frame.plan.most_past,
         })
     }
 

@@ -1,4 +1,5 @@
-//! `rejected`: a colour for why a pixel has no history, by the tests that temporal accumulation makes.
+//! `rejected`: a colour for why a pixel has no history, by the tests that temporal accumulation
+//! makes.
 
 use super::debug::DebugView;
 use crate::error::Error;

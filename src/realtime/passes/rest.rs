@@ -1,11 +1,12 @@
-//! `rest`: adds this frame's samples of ambient visibility to those since the image came to rest. (The samples of radiance are added by `paths`.)
+//! `rest`: adds this frame's samples of ambient visibility to those since the image came to rest.
+//! (The samples of radiance are added by `paths`.)
 
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::radiance::RestParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
@@ -32,7 +33,7 @@ impl Pass for Rest {
             frame: frame.params,
             current: resources.address(Resource::Current),
             rest: resources.address(Resource::Rest),
-            starts: frame.rest_starts.into(),
+            starts: frame.plan.progress.starts_anew.into(),
             reserved: 0,
         })
     }

@@ -1,4 +1,5 @@
-//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills: `primary` and `occlusion`. In place of the passes that a frame in motion needs, whose samples
+//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills:
+//! `primary` and `occlusion`. In place of the passes that a frame in motion needs, whose samples
 //! lie at one place in their pixels and which take longer than as many samples of a still.
 
 use crate::error::Result;
@@ -9,15 +10,17 @@ use crate::interface::PixelFilter;
 use crate::interface::records::block::BlockParams;
 use crate::interface::records::radiance::RestSamplesParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, LANES};
 use crate::tracer::Push;
 
-/// Added to the seed, so that frames at rest and a still of the same seed, which may be its reference, have samples of their own.
+/// Added to the seed, so that frames at rest and a still of the same seed, which may be its
+/// reference, have samples of their own.
 const SEED: u32 = 0x7265_7374;
 
-/// The pipelines and their memory, made when the first long frame comes: who never rests does without.
+/// The pipelines and their memory, made when the first long frame comes: who never rests does
+/// without.
 struct Traced {
     rays: AoRays,
     has_entry_points: bool,
@@ -89,8 +92,11 @@ impl Pass for RestSamples {
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Some(traced) = &self.traced else { return Ok(()) };
-        let sampled =
-            Push { sample_index: frame.first_sample, sample_bits: self.sample_bits, ..traced.block.push(frame, range) };
+        let sampled = Push {
+            sample_index: frame.plan.placement.first_sample,
+            sample_bits: self.sample_bits,
+            ..traced.block.push(frame, range)
+        };
         // the range before reads the samples
         r.barrier();
         traced.rays.record(r, &sampled, traced.has_entry_points);

@@ -1,5 +1,5 @@
-//! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters light, seen directly or by mirrors and glass, its material, and what is seen
-//! directly.
+//! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters
+//! light, seen directly or by mirrors and glass, its material, and what is seen directly.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use crate::gpu::Recorder;
 use crate::integrators::path::signal::{GuideRays, SignalPaths};
 use crate::interface::records::radiance::SurfacesParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Pass, Range, ResourceUse, Stage};
-use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::graph::{Frame, Pass, Range, Stage};
+use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::scene::Scene;
 use crate::tracer::{Push, Tracer};
 
@@ -25,7 +25,8 @@ struct Surfaces {
     pixels: u32,
 }
 
-/// The pass over all pixels of an image. It lists those that are `uncovered`, where there are histories.
+/// The pass over all pixels of an image. It lists those that are `uncovered`, where there are
+/// histories.
 pub fn stage(
     tracer: &Tracer,
     scene: &Scene,
@@ -50,7 +51,7 @@ pub fn stage(
 pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
     BlockParams {
         frame: frame.params,
-        centre_offset: frame.offset,
+        centre_offset: frame.plan.offset,
         ..block.params(frame.block.size, &frame.camera, frame.settings.seed)
     }
 }
@@ -74,8 +75,13 @@ impl Pass for Surfaces {
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Range { first, count } = range;
-        let push =
-            Push { scene: frame.tracer.scene_address(), first, count, sample_index: frame.first_sample, ..Default::default() };
+        let push = Push {
+            scene: frame.tracer.scene_address(),
+            first,
+            count,
+            sample_index: frame.plan.placement.first_sample,
+            ..Default::default()
+        };
         let uncovered = self.uncovered.as_ref().filter(|_| Uncovered::are_listed(frame));
         if let Some(uncovered) = uncovered.filter(|_| first == 0) {
             uncovered.clear(r);

@@ -1,5 +1,7 @@
-//! Pixels whose surface was not seen in the previous image. Where a camera or an object in motion uncovers something, one path would have to do; these pixels have some more
-//! ([`Counts::listed_bits`]), in the same launch as those of all pixels. The pass `surfaces` lists them, and `paths` reads the list.
+//! Pixels whose surface was not seen in the previous image. Where a camera or an object in motion
+//! uncovers something, one path would have to do; these pixels have some more
+//! ([`Counts::listed_bits`]), in the same launch as those of all pixels. The pass `surfaces` lists
+//! them, and `paths` reads the list.
 
 use std::sync::Arc;
 
@@ -11,7 +13,7 @@ use crate::realtime::graph::Frame;
 use crate::tracer::stream::UNCOVERED_SHARE;
 
 /// Log2 of the number of paths that uncovered pixels have besides, where there are few.
-const MOST_BITS: u32 = 2;
+const MAX_BITS: u32 = 2;
 
 /// A list of uncovered pixels.
 pub struct Uncovered {
@@ -30,7 +32,8 @@ pub struct Counts {
     pub surfaces: u32,
 }
 
-/// Number of paths that uncovered pixels have at most besides, in frames of `samples` of each of so many pixels.
+/// Number of paths that uncovered pixels have at most besides, in frames of `samples` of each of so
+/// many pixels.
 pub fn most_paths(pixels: u32, samples: u32) -> u32 {
     pixels.saturating_mul(samples) / UNCOVERED_SHARE
 }
@@ -48,9 +51,10 @@ impl Uncovered {
         })
     }
 
-    /// Whether uncovered pixels of a frame are listed: it is in motion, and there is a previous image.
+    /// Whether uncovered pixels of a frame are listed: it is in motion, and there is a previous
+    /// image.
     pub fn are_listed(frame: &Frame) -> bool {
-        frame.has_moved && frame.has_resolved
+        frame.plan.has_moved && frame.plan.has_resolved
     }
 
     /// Device address of the list: where each pixel is among those that are sampled.
@@ -85,13 +89,14 @@ impl Uncovered {
 }
 
 impl Counts {
-    /// Log2 of how often each uncovered pixel is in a launch besides, where a pixel has `1 << sample_bits` paths and there is room for so many paths more. `None`: there are none, or
+    /// Log2 of how often each uncovered pixel is in a launch besides, where a pixel has
+    /// `1 << sample_bits` paths and there is room for so many paths more. `None`: there are none, or
     /// too many.
     pub fn listed_bits(self, sample_bits: u32, room: u32) -> Option<u32> {
         let all = |bits: u32| u64::from(self.uncovered) << bits;
         let fits =
             |bits: &u32| all(*bits) <= u64::from(self.surfaces / UNCOVERED_SHARE) && all(bits + sample_bits) <= u64::from(room);
-        (0..=MOST_BITS.saturating_sub(sample_bits)).rev().find(fits).filter(|_| self.uncovered > 0)
+        (0..=MAX_BITS.saturating_sub(sample_bits)).rev().find(fits).filter(|_| self.uncovered > 0)
     }
 }
 
