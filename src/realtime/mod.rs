@@ -193,7 +193,6 @@ impl Realtime {
         let pixels = |size: [u32; 2]| u64::from(size[0]) * u64::from(size[1]);
         let extent = Extent {
             pixels: pixels(size),
-            tiled_pixels: block.rays().into(),
             half_pixels: pixels(size.map(|n| n.div_ceil(2))),
             launch_rays: launch_rays(&tracer.device().info).into(),
         };
@@ -233,8 +232,7 @@ impl Realtime {
         let settings = &settings.with_launches_of(&tracer.device().info);
         let block = Block { origin: [0, 0], size };
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let extent =
-            Extent { pixels, tiled_pixels: block.rays().into(), half_pixels: pixels.div_ceil(4), ..Default::default() };
+        let extent = Extent { pixels, half_pixels: pixels.div_ceil(4), ..Default::default() };
         let device = tracer.device();
         let frame_samples = FrameSamples::of_radiance(settings, pixels, device.info.is_cpu());
         let stages = passes::radiance_stages(tracer, flat, block, settings, options, frame_samples)?;

@@ -127,8 +127,6 @@ enum Lifetime {
 pub struct Extent {
     /// Number of pixels.
     pub pixels: u64,
-    /// Number of pixels, including those that fill up 8x8 tiles.
-    pub tiled_pixels: u64,
     /// Number of pixels at half resolution per axis.
     pub half_pixels: u64,
     /// Maximum rays of a launch.
@@ -145,7 +143,7 @@ struct Description {
 impl Resource {
     fn describe(self, extent: &Extent) -> Description {
         use Lifetime::{Frame, Host, Kept, Pair};
-        let Extent { pixels, tiled_pixels, half_pixels, launch_rays } = *extent;
+        let Extent { pixels, half_pixels, launch_rays } = *extent;
         // all in the device's memory, also what the host reads: a GPU takes ten times as long to write to the host's, pixel by pixel
         let device = |name, bytes, lifetime| Description { name, bytes, lifetime };
         match self {
