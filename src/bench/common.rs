@@ -52,7 +52,8 @@ pub struct CommonArgs {
 #[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
     /// Print one JSON record on stdout instead of text; with FILE.json, write it there instead
-    #[arg(long, value_name = "FILE.json", num_args = 0..=1, value_parser = record_file_parser(), value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.json", num_args = 0..=1, value_parser = record_file_parser())]
+    #[arg(value_hint = ValueHint::FilePath)]
     pub json: Option<Option<PathBuf>>,
     /// Also plot the results
     #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
