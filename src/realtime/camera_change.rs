@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::film::camera::CameraRecord;
-use crate::tracer::gpu_scene::rows;
+use crate::tracer::transform::rows;
 
 /// Returns true if a camera has turned, moved or zoomed by more than a camera in motion does from
 /// frame to frame: by an eighth of the view, or of the length of occlusion rays.
