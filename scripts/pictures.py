@@ -4,6 +4,8 @@ Makes those of docs/radius.md, too: one view over AO radius and falloff; and tha
 
     python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; five minutes on two cores
 
+The viewer runs a script, so the program is built with `cargo build --release --features probes`.
+
 They go to docs/images. Python's own library is enough. The difference is that of the two PNGs' linear values: orange where ambient occlusion is darker than
 the path-traced image, blue where it is brighter, white where they agree, and full colour at a difference of 0.25."""
 

@@ -3,6 +3,8 @@
 
     python3 scripts/viewer_soak.py PROGRAM [--minutes 30] [--seed 1] [--validation] [SCENE...]
 
+PROGRAM is built with the feature `probes`, whose programs run scripts.
+
 Opens each scene in turn, again and again: orbits, flies, drags sliders, numbers and dividers, plays and scrubs animations, resizes, drops files, goes through all techniques and
 tracers, splits, compares, saves, writes settings. Prints the memory of each visit and times of the interface's frames, and a verdict. Exit code 1 if the viewer fails or shows an
 error, if the Vulkan validation layer has a message (--validation), or if scenes take more memory in later visits than in earlier ones, the first left out. Three minutes are one scene,

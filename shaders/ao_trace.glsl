@@ -6,40 +6,25 @@
 Ray ray(uint index) {
     AoTraceParams p = AoTraceParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    uvec2 pixel;
-    uint at, k;
-    if (is_null(p.list)) {
-        uint place = index;
-        k = 0u;
-        // CPUs divide one lane at a time
-        if (f.rays_per_pixel > 1u) {
-            place = index / f.rays_per_pixel;
-            k = index - place * f.rays_per_pixel;
-        }
-        pixel = tile_pixel(f, place);
-        if (any(greaterThanEqual(pixel, f.size))) return no_ray();
-        at = image_index(f, pixel);
-        if (!has_rays(f, pixel, at)) return no_ray();
-    } else {
-        uint entry = Words(p.list).v[index];
-        at = entry >> 4;
-        k = entry & 15u;
-        pixel = image_pixel(f, at);
+    uint place = index, k = 0u;
+    // CPUs divide one lane at a time
+    if (f.rays_per_pixel > 1u) {
+        place = index / f.rays_per_pixel;
+        k = index - place * f.rays_per_pixel;
     }
+    uvec2 pixel = tile_pixel(f, place);
+    if (any(greaterThanEqual(pixel, f.size))) return no_ray();
+    uint at = image_index(f, pixel);
+    if (!has_rays(f, pixel, at)) return no_ray();
     claim(p.ray_count);
     vec3 ng = surface_normal(f, at);
-    vec3 w = occlusion_direction(p, f, pixel, at, ng, k);
+    vec3 w = occlusion_direction(f, pixel, at, ng, k);
     return occlusion_ray(surface_position(f, at), spawn_offset_at(f, at), ng, w, f.reach);
 }
 
 void add_sample(uint index, float visibility) {
     AoTraceParams p = AoTraceParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    if (!is_null(p.list)) {
-        uint entry = Words(p.list).v[index];
-        FloatImage(p.samples).v[(entry >> 4) * p.most_rays + (entry & 15u)] = visibility;
-        return;
-    }
     if (f.rays_per_pixel > 1u) {
         FloatImage(p.samples).v[index - push.first] = visibility;
         return;
@@ -51,7 +36,7 @@ void add_sample(uint index, float visibility) {
     if (!is_sampled(f, pixel) || is_resting(f, at)) return;
     STORE_PAIR(p.current, at, pack_estimate(Estimate(visibility, 1.0, 0.0)));
     if (!is_null(p.current_bent)) {
-        store_vec3(p.current_bent, at, visibility * occlusion_direction(p, f, pixel, at, surface_normal(f, at), 0u));
+        store_vec3(p.current_bent, at, visibility * occlusion_direction(f, pixel, at, surface_normal(f, at), 0u));
     }
 }
 

@@ -66,7 +66,7 @@ vec3 colour(DisplayParams d, FrameParams f, uint at) {
         vec2 m = motion(f, at);
         return vec3(0.5 + 0.5 * m / (abs(m) + MIDDLE_MOTION), 0.5);
     }
-    if (d.shown == SHOWN_RAYS) return vec3(unpack_estimate(LOAD_PAIR(d.current, at)).samples / d.most_rays);
+    if (d.shown == SHOWN_RAYS) return vec3(unpack_estimate(LOAD_PAIR(d.current, at)).samples / d.rays_per_pixel);
     Estimate e = unpack_estimate(LOAD_PAIR(d.history, at));
     if (d.shown == SHOWN_SAMPLES) return vec3(e.samples / f.most_samples);
     return vec3(d.shown == SHOWN_VARIANCE ? e.variance / WHITE_VARIANCE : e.mean);

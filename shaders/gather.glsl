@@ -7,19 +7,12 @@ layout(local_size_x = LANES) in;
 void main() {
     AoTraceParams p = AoTraceParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    // with a budget all samples of a frame at once, with a slot for each
-    bool planned = !is_null(p.plan);
-    uint n = planned ? 1u : f.rays_per_pixel;
-    uint k = gl_GlobalInvocationID.x;
+    uint n = f.rays_per_pixel, k = gl_GlobalInvocationID.x;
     if (k >= push.count / n) return;
     uvec2 pixel = tile_pixel(f, push.first / n + k);
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel), begin = k * n;
-    if (planned) {
-        n = LOAD_PAIR(p.plan, at).x & 0xffu;
-        begin = at * p.most_rays;
-        if (n == 0u) return;
-    } else if (!has_rays(f, pixel, at)) return;
+    if (!has_rays(f, pixel, at)) return;
     Floats samples = Floats(p.samples);
     float sum = 0.0, squares = 0.0;
     for (uint s = 0u; s < n; s++) {
@@ -32,7 +25,7 @@ void main() {
     STORE_PAIR(p.current, at, pack_estimate(Estimate(mean, float(n), variance)));
     if (BENT_NORMALS) {
         vec3 ng = surface_normal(f, at), bent = vec3(0.0);
-        for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(p, f, pixel, at, ng, s);
+        for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(f, pixel, at, ng, s);
         store_vec3(p.current_bent, at, bent / float(n));
     }
 }

@@ -100,8 +100,7 @@ void main() {
             }
         }
     }
-    float most = is_null(p.plan) ? f.most_samples : uintBitsToFloat(LOAD_PAIR(p.plan, at).y);
-    past.samples = min(past.samples, max(most - now.samples, 0.0));
+    past.samples = min(past.samples, max(f.most_samples - now.samples, 0.0));
     float total = past.samples + now.samples;
     Estimate e = Estimate(0.0, total, 0.0);
     if (total > 0.0) {

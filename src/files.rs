@@ -24,6 +24,11 @@ const MAX_TEXT: u64 = 64 << 20;
 /// Number of first bytes by which a file is told from what others put in its place.
 const START: u64 = 1024;
 
+/// Whether the name of a file has this extension, in either case of letters.
+pub fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
 /// Reads a file whole.
 ///
 /// # Errors

@@ -329,7 +329,7 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
 /// Section 8: pixels that know their radiance stay what they are beside a glint, if that is not of a single sample.
 #[test]
 fn gpu_stress_catches_a_glint_that_lights_quiet_pixels() {
-    for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
+    for filter in [FilterKind::Box, FilterKind::Atrous] {
         let moved = |hits: u32, detail: f32| {
             let mut watch = Quiet;
             let mut watch = Watch::new(&mut watch);
@@ -346,7 +346,7 @@ fn gpu_stress_catches_a_glint_that_lights_quiet_pixels() {
 /// Section 8: pixels that rare light has not reached take part in the mean of those that it has, if these are not a few glints.
 #[test]
 fn gpu_stress_catches_a_filter_that_keeps_what_is_dark_by_chance() {
-    for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
+    for filter in [FilterKind::Box, FilterKind::Atrous] {
         let left = |noise: f32| {
             let mut quiet = Quiet;
             hot_pixel::rare_light(&setup(), TracerKind::Compute, filter, noise, &mut Watch::new(&mut quiet)).unwrap()

@@ -1,7 +1,6 @@
 // The mean over a pixel's neighbours on the same surface, weighted by their samples, so that pixels without samples get their value
 // from neighbours (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). The kernel is a box whose radius is just large enough for
-// the mean to have `filter_samples` samples; or its two axes one after the other; or a small box repeatedly with strides that
-// double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
+// the mean to have `filter_samples` samples; or a small box repeatedly with strides that double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
 // HPG 2010).
 //
 // How far the pixels in the box differ by more than their noise says how much of the difference between pixel and box is detail;
@@ -150,8 +149,7 @@ void main() {
         }
         strip[k].edge = edge_test(f, own_guides[k], surface_normal(f, at), sample_place(f, vec2(pixel)));
         strip[k].edge.normal = edge_normal(strip[k].edge.normal, own_guides[k]);
-        ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
-        ivec2 lower = max(-reach, -(pixel >> stride_bits)), upper = min(reach, (ivec2(f.size) - 1 - pixel) >> stride_bits);
+        ivec2 lower = max(ivec2(-radius), -(pixel >> stride_bits)), upper = min(ivec2(radius), (ivec2(f.size) - 1 - pixel) >> stride_bits);
         strip[k].lower = place_in_strip(k) + ivec2(lower.x << stride_bits, lower.y);
         strip[k].upper = place_in_strip(k) + ivec2(upper.x << stride_bits, upper.y);
     }

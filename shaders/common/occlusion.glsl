@@ -6,9 +6,7 @@
 #include "common/warp.glsl"
 #include "interface/passes.glsl"
 
-vec2 direction_sample(AoTraceParams p, FrameParams f, uvec2 pixel, uint k) {
-    // with a budget a pixel's sequence continues where it stopped
-    if (!is_null(p.plan)) return sequence_2d(f.sequence, f.seed, pixel, (LOAD_PAIR(p.plan, image_index(f, pixel)).x >> 8) + k, 0u, 1u);
+vec2 direction_sample(FrameParams f, uvec2 pixel, uint k) {
     // what is ordered over the image counts the pixels that are sampled, what is ordered over time the frames in which they are
     if (f.sequence == SEQUENCE_BLUE) {
         uvec2 cell = f.pattern == PATTERN_QUARTER ? pixel >> 1 : f.pattern == PATTERN_CHECKER ? uvec2(pixel.x >> 1, pixel.y) : pixel;
@@ -18,9 +16,9 @@ vec2 direction_sample(AoTraceParams p, FrameParams f, uvec2 pixel, uint k) {
 }
 
 // Of ray k of a pixel in this frame: over the cosine-weighted hemisphere (pbrt-v4's AOIntegrator). `ng`: its geometric normal.
-vec3 occlusion_direction(AoTraceParams p, FrameParams f, uvec2 pixel, uint at, vec3 ng, uint k) {
+vec3 occlusion_direction(FrameParams f, uvec2 pixel, uint at, vec3 ng, uint k) {
     vec3 axis = is_null(f.axes) ? ng : load_vec3(f.axes, at);
-    return to_world(axis, cosine_hemisphere(direction_sample(p, f, pixel, k)));
+    return to_world(axis, cosine_hemisphere(direction_sample(f, pixel, k)));
 }
 
 #endif

@@ -6,27 +6,17 @@
 #include "common/sampler.glsl"
 #include "interface/sequence.glsl"
 
-
 // 2^32 / g and 2^32 / g^2, g = 1.3247... the plastic number
 const uvec2 R2_STEP = uvec2(3242174889u, 2447445414u);
 
 // Sample `index` of `count` that a pixel takes in a frame, as fractions of 2^32.
 uvec2 sequence_bits(uint sequence, uint seed, uvec2 pixel, uint frame, uint index, uint count) {
-    uint n = frame * count + index;
-    if (sequence == SEQUENCE_SOBOL) return sample_2d_bits(seed, pixel, n, AO_DIRECTION);
-    if (sequence == SEQUENCE_BLUE) {
-        seed = hash_combine(seed, AO_DIRECTION);
-        uvec2 p = sobol_2d(owen_scramble(morton(pixel), seed) * count + index);
-        p = uvec2(owen_scramble(p.x, hash_combine(seed, 0u)), owen_scramble(p.y, hash_combine(seed, 1u)));
-        return p + frame * R2_STEP;
-    }
-    seed = hash_combine(hash_combine(hash_combine(seed, pixel.x), pixel.y), AO_DIRECTION);
-    if (sequence == SEQUENCE_R2) return uvec2(hash_combine(seed, 0u), hash_combine(seed, 1u)) + n * R2_STEP;
-    uvec2 random = uvec2(hash_combine(seed, 2u * n), hash_combine(seed, 2u * n + 1u));
-    if (sequence == SEQUENCE_WHITE) return random;
-    // sixteen samples in a row visit each cell of a grid of four by four once
-    uint cell = owen_scramble(n << 28, hash_combine(seed, n >> 4)) >> 28;
-    return uvec2(cell & 3u, cell >> 2) << 30 | random >> 2;
+    if (sequence == SEQUENCE_SOBOL) return sample_2d_bits(seed, pixel, frame * count + index, AO_DIRECTION);
+    // SEQUENCE_BLUE
+    seed = hash_combine(seed, AO_DIRECTION);
+    uvec2 p = sobol_2d(owen_scramble(morton(pixel), seed) * count + index);
+    p = uvec2(owen_scramble(p.x, hash_combine(seed, 0u)), owen_scramble(p.y, hash_combine(seed, 1u)));
+    return p + frame * R2_STEP;
 }
 
 vec2 sequence_2d(uint sequence, uint seed, uvec2 pixel, uint frame, uint index, uint count) {

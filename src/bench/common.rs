@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueHint};
 use serde::Serialize;
 
@@ -47,8 +48,9 @@ pub struct CommonArgs {
 /// Outputs of a benchmark, and of `skylit bench report`.
 #[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
-    /// Print one JSON record on stdout instead of text; with a FILE, which ends in .json or follows an =, write it there instead
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
+    /// Print one JSON record on stdout instead of text; with FILE.json, write it there instead
+    #[arg(long, value_name = "FILE.json", num_args = 0..=1, value_parser = record_file_parser())]
+    #[arg(value_hint = ValueHint::FilePath)]
     pub json: Option<Option<PathBuf>>,
     /// Also plot the results
     #[arg(long, value_name = "FILE.svg", value_hint = ValueHint::FilePath)]
@@ -59,6 +61,15 @@ pub struct OutputArgs {
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// A parser of names of records. What follows `--json` may be a scene: no scene's name ends in
+/// .json, and no record takes a scene's place.
+fn record_file_parser() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match files::has_extension(&path, "json") {
+        true => Ok(path),
+        false => Err("the name of a record ends in .json; without one, --json is the last option"),
+    })
 }
 
 impl OutputArgs {

@@ -16,7 +16,8 @@ use crate::terminal::console::Failure;
 /// `skylit bench report`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    before_help = "Examples:\n  skylit bench report rays.json frames.json --html report\n  skylit bench report frames.json --baseline before.json"
+    before_help = "Examples:\n  skylit bench report rays.json frames.json --html report\n  skylit bench report frames.json --baseline before.json",
+    mut_arg("json", |json| json.require_equals(true))
 )]
 pub struct BenchReportArgs {
     /// JSON records of benchmarks, in any order
@@ -25,7 +26,7 @@ pub struct BenchReportArgs {
     /// Compare with an earlier JSON record of the same benchmark; once for each benchmark. Anything that is worse beyond noise is named and fails
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
     pub baseline: Vec<PathBuf>,
-    /// Outputs
+    /// Outputs. What follows a bare `--json` is a record to read, so a file needs an `=` here.
     #[command(flatten)]
     pub outputs: OutputArgs,
 }

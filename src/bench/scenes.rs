@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::camera::Choice;
 use crate::scene::{Camera, Environment, EnvironmentMap, builtin, load};
 
@@ -164,7 +165,7 @@ impl SceneList {
 
 /// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
 pub fn check_exists(source: &str) -> Result<()> {
-    if Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+    if files::has_extension(Path::new(source), "json") {
         return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
     }
     let made = builtin::exists(source.strip_prefix("builtin:").unwrap_or(source));

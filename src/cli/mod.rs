@@ -34,6 +34,7 @@ use clap::error::ErrorKind;
 use clap::{FromArgMatches, Parser};
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::gpu::threads;
 use crate::memory;
 use crate::settings::parse::usage_message;
@@ -147,7 +148,7 @@ fn start_threads() -> Result<()> {
 
 /// Says which variables are ignored that name folders of the user.
 fn note_ignored_folders() {
-    for (name, path) in crate::files::ignored_user_folders() {
+    for (name, path) in files::ignored_user_folders() {
         console::note(&format!("{name} is ignored: {} is not an absolute path", path.display()));
     }
 }
@@ -155,9 +156,8 @@ fn note_ignored_folders() {
 fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let start = Instant::now();
     // before parsing: usage errors must be reported as JSON, too
-    let arguments = with_json_file(arguments);
-    let [json, quiet] =
-        [&["--json"][..], &["--quiet", "-q"]].map(|names| arguments.iter().any(|a| names.iter().any(|n| a == n)));
+    let json = prints_json(&arguments);
+    let quiet = arguments.iter().any(|a| a == "--quiet" || a == "-q");
     panic::install();
     // before other threads start, which inherit it
     interrupt::block_file_size_signal();
@@ -212,20 +212,12 @@ fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
-/// `skylit bench ... --json FILE.json` means `--json=FILE.json`: elsewhere what follows `--json` is
-/// a scene, but no scene's name ends in .json. Those of records do: `skylit bench report` reads
-/// them.
-fn with_json_file(mut arguments: Vec<OsString>) -> Vec<OsString> {
-    if arguments.get(1).is_some_and(|a| a == "bench") && arguments.get(2).is_none_or(|a| a != "report") {
-        let is_file = |name: &OsString| Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let end = arguments.iter().position(|a| a == "--").unwrap_or(arguments.len());
-        if let Some(k) = (2..end.saturating_sub(1)).find(|&k| arguments[k] == "--json" && is_file(&arguments[k + 1])) {
-            let file = arguments.remove(k + 1);
-            arguments[k].push("=");
-            arguments[k].push(file);
-        }
-    }
-    arguments
+/// Whether errors are records on stdout, too, which usage errors are as well. The
+/// `--json FILE.json` of a benchmark prints none.
+fn prints_json(arguments: &[OsString]) -> bool {
+    let is_benchmark = arguments.get(1).is_some_and(|a| a == "bench") && arguments.get(2).is_none_or(|a| a != "report");
+    let is_file = |name: &OsString| is_benchmark && files::has_extension(Path::new(name), "json");
+    (1..arguments.len()).any(|k| arguments[k] == "--json" && !arguments.get(k + 1).is_some_and(is_file))
 }
 
 fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
@@ -288,21 +280,13 @@ mod tests {
     }
 
     #[test]
-    fn a_json_file_needs_no_equals_sign() {
-        let joined = |line: &str| -> String {
-            let words = line.split(' ').map(OsString::from).collect();
-            with_json_file(words).iter().map(|w| w.to_string_lossy()).collect::<Vec<_>>().join(" ")
-        };
-        assert_eq!(joined("skylit bench ao --json a.json scene.glb"), "skylit bench ao --json=a.json scene.glb");
-        assert_eq!(joined("skylit bench rays --json dir/A.JSON"), "skylit bench rays --json=dir/A.JSON");
-        let same = [
-            "skylit bench ao --json scene.glb",
-            "skylit bench ao a.json",
-            "skylit bench ao --json",
-            "skylit diff --json a.json b.png",
-        ];
-        for line in same {
-            assert_eq!(joined(line), line);
+    fn a_json_file_keeps_stdout_empty() {
+        let prints = |line: &str| prints_json(&line.split(' ').map(OsString::from).collect::<Vec<_>>());
+        for line in ["skylit bench ao --json", "skylit bench report --json a.json", "skylit diff --json a.json b.png"] {
+            assert!(prints(line), "{line}");
+        }
+        for line in ["skylit bench ao --json a.json scene.glb", "skylit bench rays --json=a.json", "skylit bench ao a.json"] {
+            assert!(!prints(line), "{line}");
         }
     }
 

@@ -1,5 +1,8 @@
-//! `skylit view`: a window in which a scene is looked at, or a script that uses it.
+//! `skylit view`: a window in which a scene is looked at, or, with the feature `probes`, a script
+//! that uses it.
 
+#[cfg(feature = "probes")]
+use std::path::Path;
 use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
@@ -15,7 +18,9 @@ use crate::scene::load;
 use crate::settings::parse::parse_rate;
 use crate::terminal::console::{Failure, Verbosity};
 use crate::tracer::DeviceSettings;
-use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, headless, window};
+#[cfg(feature = "probes")]
+use crate::viewer::headless;
+use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, window};
 
 /// Size of the window, points.
 const DEFAULT_SIZE: [u32; 2] = [1280, 800];
@@ -49,6 +54,7 @@ pub struct ViewArgs {
     #[arg(long, value_enum, hide_short_help = true)]
     pub painter: Option<Painter>,
     /// Run this script without a window (docs/viewer.md), and end
+    #[cfg(feature = "probes")]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide_short_help = true)]
     pub headless_script: Option<PathBuf>,
     /// What is shown first, and how; --size is the window's
@@ -57,7 +63,7 @@ pub struct ViewArgs {
     /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
-    /// How the figures of a script are shown
+    /// What is printed beside the window
     #[command(flatten)]
     pub verbosity: Verbosity,
 }
@@ -106,6 +112,9 @@ fn is_shown(settings: &RenderSettings, given: &RenderSettings) -> bool {
 }
 
 /// Opens the window, or runs the script.
+///
+/// # Errors
+/// Those of the settings, of the window and of the script.
 pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let given = args.settings.over_file(args.settings_file.as_deref())?;
     given.camera.check()?;
@@ -140,16 +149,19 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         painter: args.painter.unwrap_or(if is_cpu { Painter::Cpu } else { Painter::Vulkan }),
         device_name: device.map(|d| d.name),
     };
+    #[cfg(feature = "probes")]
+    if let Some(script) = &args.headless_script {
+        return run_script(&options, script, &args.verbosity);
+    }
+    crate::terminal::interrupt::install();
+    Ok(window::run(&options)?)
+}
 
-    // without a script the window is opened
-    let Some(script) = &args.headless_script else {
-        crate::terminal::interrupt::install();
-        return Ok(window::run(&options)?);
-    };
-
-    // a script prints its figures
-    let console = args.verbosity.console();
-    let sections = headless::run(&options, script)?;
+/// Runs a script without a window, and prints the figures of its sections.
+#[cfg(feature = "probes")]
+fn run_script(options: &ViewOptions, script: &Path, verbosity: &Verbosity) -> Result<(), Failure> {
+    let console = verbosity.console();
+    let sections = headless::run(options, script)?;
     for section in &sections {
         let [median, p95, most] = section.ui_frame_ms;
         let first = section.first_picture_seconds.map_or(String::new(), |s| format!("; first picture after {s:.2} s"));

@@ -167,13 +167,6 @@ impl WindowRenderer {
         Ok(())
     }
 
-    /// Largest side of a texture, in pixels.
-    pub fn max_texture_side(&self) -> usize {
-        // SAFETY: the physical device is of this instance
-        let limits = unsafe { self.instance.raw.get_physical_device_properties(self.physical) }.limits;
-        limits.max_image_dimension2_d as usize
-    }
-
     /// Takes the messages of the validation layer since the last call.
     pub fn validation_messages(&self) -> Vec<String> {
         self.instance.validation.as_ref().map(|v| v.take()).unwrap_or_default()

@@ -120,18 +120,6 @@ enumerations! {
         /// Occlusion texture of the material; 1 without one.
         BakedOcclusion = 4, "VIEW_BAKED_OCCLUSION";
     }
-
-    /// Stages of the pass that distributes a frame's ray budget over pixels.
-    pub enum BudgetStage in "budget_stage" {
-        /// The number of samples that each pixel desires.
-        DesiredSamples = 0, "STAGE_DESIRED_SAMPLES";
-        /// Sums of desired samples at widely spaced levels.
-        Coarse = 1, "STAGE_COARSE";
-        /// Sums of desired samples at levels between two coarse ones.
-        Fine = 2, "STAGE_FINE";
-        /// The list of rays.
-        Rays = 3, "STAGE_RAYS";
-    }
 }
 
 #[allow(clippy::derivable_impls, reason = "the macro passes on no attribute of a variant")]
@@ -174,26 +162,18 @@ choices! {
     /// Sampler of ray directions: a sequence of points in the unit square for each pixel, continued
     /// from frame to frame.
     ///
-    /// `Stratified`: sixteen consecutive samples of a pixel, over its frames, visit each cell of a
-    /// 4x4 grid once. `Sobol`: each pixel has its own sequence, which frames continue (Burley
-    /// 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the
-    /// samples of an aligned square of pixels are a net, so that filtering it leaves little error
-    /// (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via
-    /// Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are
-    /// shifted by Roberts' R2 sequence ("The Unreasonable Effectiveness of Quasirandom Sequences",
-    /// 2018).
+    /// `Sobol`: each pixel has its own sequence, which frames continue (Burley 2020). `Blue`: one
+    /// sequence over the image, in the order of a shuffled Morton curve: the samples of an aligned
+    /// square of pixels are a net, so that filtering it leaves little error (Ahmed and Wonka,
+    /// "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering
+    /// of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are shifted by Roberts' R2
+    /// sequence ("The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
     #[repr(u32)]
     pub enum Sequence (default Blue) {
-        /// Independent random numbers
-        White = "white",
-        /// Jittered on a 4x4 grid
-        Stratified = "stratified",
         /// Owen-scrambled Sobol, one sequence per pixel
         Sobol = "sobol",
         /// Owen-scrambled Sobol over the image: blue-noise error
         Blue = "blue",
-        /// R2 sequence (Roberts), Cranley-Patterson rotation per pixel
-        R2 = "r2",
     }
 }
 
@@ -201,11 +181,8 @@ impl Sequence {
     /// The name of its constant in shaders.
     const fn glsl_name(self) -> &'static str {
         match self {
-            Self::White => "SEQUENCE_WHITE",
-            Self::Stratified => "SEQUENCE_STRATIFIED",
             Self::Sobol => "SEQUENCE_SOBOL",
             Self::Blue => "SEQUENCE_BLUE",
-            Self::R2 => "SEQUENCE_R2",
         }
     }
 }

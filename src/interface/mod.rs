@@ -15,7 +15,7 @@ pub mod path_options;
 pub mod records;
 
 pub use enumerations::{
-    BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, ToneMap, TransmissionMode, View, Wrap,
+    DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, ToneMap, TransmissionMode, View, Wrap,
 };
 pub use features::{
     BsdfModel, BsdfModels, LightKind, LightKinds, MaterialFeature, MaterialFeatures, ShadingFeatures, TextureFeature,

@@ -150,14 +150,6 @@ impl<'a> ImagePair<'a> {
     }
 }
 
-/// Coverage of the pixels that are below 250/255 in the first channel of either image: Larsen's
-/// mask against flattery by white pixels.
-pub fn not_white(image: &[f32], reference: &[f32], channels: usize) -> Vec<f32> {
-    let channels = channels.max(1);
-    let limit = 250.0 / 255.0;
-    image.chunks(channels).zip(reference.chunks(channels)).map(|(a, b)| (a[0] < limit || b[0] < limit) as u8 as f32).collect()
-}
-
 /// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 -
 /// exp(-radiance).
 pub fn bad_pixels(image: &[f32], reference: &[f32]) -> f64 {

@@ -106,11 +106,6 @@ impl LagCurve {
     pub fn gone(&self) -> Option<usize> {
         self.residuals.iter().position(|g| g.abs() < Self::GONE)
     }
-
-    /// All of the ghost: the sum of g^2 over the frames, in frames of the whole old image.
-    pub fn ghosting_energy(&self) -> f64 {
-        self.residuals.iter().map(|g| g * g).sum()
-    }
 }
 
 /// Logarithm; minus infinity of what is not above 0.

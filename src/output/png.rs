@@ -151,11 +151,6 @@ pub fn depth_to_unit(depth: &[f32]) -> Vec<f32> {
     depth.par_iter().map(|d| if seen(d) { grey(*d) } else { 0.0 }).collect()
 }
 
-/// [`depth_to_unit`] in 8 bits.
-pub fn depth_to_grey(depth: &[f32]) -> Vec<u8> {
-    depth_to_unit(depth).into_par_iter().map(|grey| (grey * 255.0).round() as u8).collect()
-}
-
 /// Does the header of a PNG name no transfer function but 1? The crate image does not tell. False for other bytes.
 pub fn is_linear(bytes: &[u8]) -> bool {
     let reader = ::png::Decoder::new(Cursor::new(bytes)).read_info();

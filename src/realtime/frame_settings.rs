@@ -7,7 +7,7 @@ use crate::integrators::ao::settings::AoSettings;
 use crate::output::{apng, frames};
 use crate::raster::Primary;
 use crate::realtime::display::DisplayMode;
-use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
+use crate::realtime::{FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_playback_time, parse_rate};
@@ -122,8 +122,6 @@ settings! {
         /// Occlusion rays, or paths, per pixel and frame [default: the preset's]
         rays_per_pixel: Option<u32>,
             option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS))), applies(FRAMES);
-        /// How rays are distributed over pixels (docs/realtime.md) [default: uniform]
-        budget: Option<Budget>, option(value_enum), applies(FRAMES), research;
         /// Resolution of ray tracing per frame [default: the preset's]
         resolution: Option<Resolution>, option(value_enum), applies(FRAMES);
         /// Sampler of ray directions [default: the preset's]
@@ -168,7 +166,6 @@ impl FrameSettings {
             let own = [
                 (technique != Technique::Larsen, "--technique"),
                 (self.rays_per_pixel.is_some(), "--rays-per-pixel"),
-                (self.budget.is_some(), "--budget"),
                 (self.resolution.is_some(), "--resolution"),
                 (self.sequence.is_some(), "--sequence"),
                 (self.history.is_some(), "--history"),
@@ -188,7 +185,6 @@ impl FrameSettings {
             PrimaryChoice::Raster => Some(Primary::Raster),
         };
         s.rays_per_pixel = self.rays_per_pixel.unwrap_or(s.rays_per_pixel);
-        s.budget = self.budget.unwrap_or_default();
         s.resolution = self.resolution.unwrap_or(s.resolution);
         s.sequence = self.sequence.unwrap_or(s.sequence);
         s.history = self.history.unwrap_or(s.history);

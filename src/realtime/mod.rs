@@ -55,7 +55,7 @@ use plan::{FramePlan, Inputs, Signal};
 pub use readback::Surface;
 use resources::Resource;
 use seen::SeenSurfaces;
-pub use settings::{Budget, Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
+pub use settings::{Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
 use signals::Pipeline;
 use signals::larsen::Larsen;
 use signals::radiance::Radiance;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::denoise::RadianceRecord;
-use crate::interface::records::frame::{SUMS_COUNT, SurfaceRecord};
+use crate::interface::records::frame::SurfaceRecord;
 use crate::interface::records::radiance::KnownHit;
 
 /// Bytes of a `SurfaceRecord`.
@@ -46,7 +46,7 @@ pub enum Resource {
     Current,
     /// Bent normals of this frame's samples.
     CurrentBent,
-    /// Ambient visibility of each ray of a launch, or with a budget of the frame.
+    /// Ambient visibility of each ray of a launch.
     Samples,
     /// Number of occlusion rays traced.
     RayCount,
@@ -66,16 +66,6 @@ pub enum Resource {
     DisplayImage,
     /// What a debug view counts.
     DebugCounts,
-    /// Budget: standard deviation of one sample and number of samples, pixels in tile order.
-    DesiredSamples,
-    /// Budget: sums, indexed by `SUMS_*`.
-    Sums,
-    /// Budget: number of rays and maximum history length of each pixel.
-    Plan,
-    /// Budget: pixel of each ray.
-    RayPixels,
-    /// Budget: rays traced for each pixel in all frames.
-    TotalRays,
     /// Radiance: diffuse albedo and roughness of each pixel's surface.
     Materials,
     /// Radiance: emission and background seen directly.
@@ -138,12 +128,8 @@ enum Lifetime {
 pub struct Extent {
     /// Number of pixels.
     pub pixels: u64,
-    /// Number of pixels, including those that fill up 8x8 tiles.
-    pub tiled_pixels: u64,
     /// Number of pixels at half resolution per axis.
     pub half_pixels: u64,
-    /// With a variance budget the maximum rays per pixel; else 0.
-    pub most_rays: u64,
     /// Maximum rays of a launch.
     pub launch_rays: u64,
 }
@@ -158,7 +144,7 @@ struct Description {
 impl Resource {
     fn describe(self, extent: &Extent) -> Description {
         use Lifetime::{Frame, Host, Kept, Pair};
-        let Extent { pixels, tiled_pixels, half_pixels, most_rays, launch_rays } = *extent;
+        let Extent { pixels, half_pixels, launch_rays } = *extent;
         // all in the device's memory, also what the host reads: a GPU takes ten times as long to
         // write to the host's, pixel by pixel
         let device = |name, bytes, lifetime| Description { name, bytes, lifetime };
@@ -171,7 +157,6 @@ impl Resource {
             Self::PreviousPosition => device("previous positions", VECTOR_BYTES * pixels, Kept),
             Self::Current => device("estimates of the frame", PAIR_BYTES * pixels, Frame),
             Self::CurrentBent => device("bent normals of the frame", VECTOR_BYTES * pixels, Frame),
-            Self::Samples if most_rays > 0 => device("samples", 4 * most_rays * pixels, Frame),
             Self::Samples => device("samples", 4 * launch_rays, Frame),
             Self::RayCount => device("number of rays", 4, Kept),
             Self::History => device("history", PAIR_BYTES * pixels, Pair),
@@ -182,11 +167,6 @@ impl Resource {
             Self::BentResult => device("bent normals", VECTOR_BYTES * pixels, Kept),
             Self::DisplayImage => device("display", 4 * pixels, Kept),
             Self::DebugCounts => device("counts of a debug view", 4 * pixels, Kept),
-            Self::DesiredSamples => device("desired samples", 8 * tiled_pixels, Frame),
-            Self::Sums => device("sums of desired samples", 4 * u64::from(SUMS_COUNT), Frame),
-            Self::Plan => device("plan of rays", 8 * pixels, Frame),
-            Self::RayPixels => device("list of rays", 4 * most_rays * pixels, Frame),
-            Self::TotalRays => device("rays taken", 4 * pixels, Kept),
             Self::Materials => device("materials of surfaces", QUAD_BYTES * pixels, Kept),
             Self::Direct => device("direct view", QUAD_BYTES * pixels, Kept),
             Self::KnownHits => device("hits of camera rays", size_of::<KnownHit>() as u64 * pixels, Kept),

@@ -6,7 +6,6 @@ use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::integrators::path::PathOptions;
 pub use crate::interface::Resolution;
 use crate::interface::constants;
-use crate::interface::records::frame::{STEP_HORIZONTAL, STEP_VERTICAL};
 use crate::interface::records::passes::FilterParams;
 use crate::raster::Primary;
 use crate::sampling::Sequence;
@@ -43,34 +42,20 @@ impl Resolution {
 }
 
 choices! {
-    /// How the rays of a frame are distributed over its pixels.
-    pub enum Budget {
-        /// The same number for every pixel
-        Uniform = "uniform",
-        /// The same total, in proportion to the standard error of pixels
-        Variance = "variance",
-    }
-}
-
-choices! {
     /// Spatial filter of a frame. Its radius follows from how many samples a pixel has.
     pub enum FilterKind (default Box) {
         /// No spatial filter
         None = "none",
         /// Edge-aware box filter; fewer samples, larger radius
         Box = "box",
-        /// Edge-aware box filter, separable
-        Separable = "separable",
         /// Edge-aware a-trous filter
         Atrous = "atrous",
     }
 }
 
-/// A step of a filter: a box along rows, columns or both, with a distance between taps.
+/// A step of a filter: a box, with a distance between taps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilterStep {
-    /// Whether the box extends along rows and along columns.
-    pub sides: [bool; 2],
     /// Maximum number of taps to each side.
     pub radius: u32,
     /// Distance between taps, in pixels.
@@ -80,13 +65,7 @@ pub struct FilterStep {
 impl FilterStep {
     /// Parameters for shaders; all other fields are 0.
     pub fn params(&self) -> FilterParams {
-        let [along_rows, along_columns] = self.sides;
-        FilterParams {
-            sides: if along_rows { STEP_HORIZONTAL } else { 0 } | if along_columns { STEP_VERTICAL } else { 0 },
-            stride: self.stride,
-            radius: self.radius,
-            ..Default::default()
-        }
+        FilterParams { stride: self.stride, radius: self.radius, ..Default::default() }
     }
 }
 
@@ -109,15 +88,14 @@ impl Filter {
 
     /// The steps of the filter, in order; at least one, because the last step converts estimates to the result.
     pub fn steps(&self) -> Vec<FilterStep> {
-        let step = |sides, radius, stride| FilterStep { sides, radius, stride };
+        let step = |radius, stride| FilterStep { radius, stride };
         match self.kind {
-            FilterKind::None => vec![step([true, true], 0, 1)],
-            FilterKind::Box => vec![step([true, true], self.radius, 1)],
-            FilterKind::Separable => vec![step([true, false], self.radius, 1), step([false, true], self.radius, 1)],
+            FilterKind::None => vec![step(0, 1)],
+            FilterKind::Box => vec![step(self.radius, 1)],
             FilterKind::Atrous => {
                 // 1, 1 + 2, 1 + 2 + 4, ... pixels
                 let levels = (self.radius + 1).max(2).ilog2();
-                (0..levels).map(|k| step([true, true], self.radius.min(1), 1 << k)).collect()
+                (0..levels).map(|k| step(self.radius.min(1), 1 << k)).collect()
             }
         }
     }
@@ -156,8 +134,6 @@ pub struct Settings {
     pub primary: Option<Primary>,
     /// Occlusion rays of each pixel that is sampled in a frame, 1 to [`Settings::MAX_RAYS`].
     pub rays_per_pixel: u32,
-    /// Distribution of rays over pixels.
-    pub budget: Budget,
     /// Pattern of pixels that are sampled in a frame.
     pub resolution: Resolution,
     /// Sampler of ray directions.
@@ -212,10 +188,6 @@ impl Default for Settings {
 impl Settings {
     /// Maximum rays per pixel and frame.
     pub const MAX_RAYS: u32 = 4096;
-    /// With a variance budget: maximum rays of a pixel in a frame, as a multiple of the average.
-    pub const MAX_SHARE: u32 = 4;
-    /// With a variance budget: maximum average rays per pixel. Four bits store the number of a pixel's rays.
-    const MAX_BUDGET: u32 = 4;
     /// Maximum history length in samples: the largest number up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
 
@@ -224,7 +196,7 @@ impl Settings {
 
     /// Returns true if the image converges at rest.
     pub fn converges(&self) -> bool {
-        self.converge && self.history > 1 && self.technique == Technique::Traced && self.budget == Budget::Uniform
+        self.converge && self.history > 1 && self.technique == Technique::Traced
     }
 
     /// Frames at rest that antialiasing averages after histories are full: as many places within a pixel.
@@ -252,11 +224,6 @@ impl Settings {
         (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
     }
 
-    /// Maximum rays of a pixel in a frame with a variance budget; else 0.
-    pub fn most_rays(&self) -> u32 {
-        if self.budget == Budget::Variance { Self::MAX_SHARE * self.rays_per_pixel } else { 0 }
-    }
-
     /// Checks that the settings are in their ranges and fit together.
     ///
     /// # Errors
@@ -265,14 +232,6 @@ impl Settings {
         let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
         if !(1..=Self::MAX_RAYS).contains(&self.rays_per_pixel) {
             return wrong(&format!("rays per pixel must be 1 to {}", Self::MAX_RAYS));
-        }
-        if self.budget == Budget::Variance
-            && (self.rays_per_pixel > Self::MAX_BUDGET || self.history < 2 || self.technique != Technique::Traced)
-        {
-            return wrong(&format!(
-                "a budget by variance needs traced rays, a history, and 1 to {} rays per pixel",
-                Self::MAX_BUDGET
-            ));
         }
         if self.history == 0 {
             return wrong("the history must be at least 1 frame (1 = no temporal accumulation)");
@@ -310,7 +269,6 @@ impl Settings {
         match self {
             Settings { technique: Technique::Gtao, .. } => wrong("--technique gtao"),
             Settings { technique: Technique::Larsen, .. } => wrong("--preset larsen"),
-            Settings { budget: Budget::Variance, .. } => wrong("--budget variance"),
             Settings { primary: Some(Primary::Raster), .. } => wrong("--primary raster"),
             Settings { bent: true, .. } => wrong("the bent normal"),
             _ => Ok(()),
@@ -355,7 +313,6 @@ impl Preset {
             technique: Technique::Traced,
             primary: None,
             rays_per_pixel: 1,
-            budget: Budget::Uniform,
             resolution: Resolution::Full,
             sequence: Sequence::Sobol,
             seed: 0,
@@ -422,9 +379,9 @@ mod tests {
         for kind in FilterKind::ALL {
             for radius in [0, 1, 3, 7, 15] {
                 let steps = Filter { kind, radius, samples: 64.0 }.steps();
-                let reach = |axis: usize| steps.iter().filter(|s| s.sides[axis]).map(|s| s.radius * s.stride).sum::<u32>();
+                let reach: u32 = steps.iter().map(|s| s.radius * s.stride).sum();
                 let wanted = if kind == FilterKind::None { 0 } else { radius };
-                assert_eq!([reach(0), reach(1)], [wanted; 2], "{kind:?} {radius}");
+                assert_eq!(reach, wanted, "{kind:?} {radius}");
             }
         }
     }

@@ -137,7 +137,6 @@ impl Renderer {
                 ("ao.falloff", how.falloff.to_string()),
                 ("ao.radius", how.radius.to_string()),
                 ("ao.normal", how.hemisphere.to_string()),
-                ("budget", how.budget.to_string()),
                 ("sequence", how.sequence.to_string()),
                 ("technique", how.technique.to_string()),
             ],

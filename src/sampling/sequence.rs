@@ -17,36 +17,25 @@ impl Sequence {
     pub fn evenness(self) -> f32 {
         match self {
             Sequence::Sobol => 0.375,
-            Sequence::Blue | Sequence::R2 => 0.25,
-            Sequence::White | Sequence::Stratified => 0.0,
+            Sequence::Blue => 0.25,
         }
     }
 
     /// Sample `index` of the `count` that `pixel` takes in a frame, as fractions of 2^32. The
     /// sequence continues from frame to frame.
     pub fn get_2d(self, seed: u32, pixel: [u32; 2], frame: u32, index: u32, count: u32) -> [u32; 2] {
-        let n = frame.wrapping_mul(count).wrapping_add(index);
-        let step = |p: [u32; 2], n: u32| std::array::from_fn(|k| p[k].wrapping_add(n.wrapping_mul(R2_STEP[k])));
         match self {
-            Sequence::Sobol => return Sampler { seed }.get_2d(pixel, n, AO_DIRECTION),
+            Sequence::Sobol => {
+                let n = frame.wrapping_mul(count).wrapping_add(index);
+                Sampler { seed }.get_2d(pixel, n, AO_DIRECTION)
+            }
             Sequence::Blue => {
                 let seed = hash_combine(seed, AO_DIRECTION);
                 let [x, y] = sobol_2d(owen_scramble(morton(pixel), seed).wrapping_mul(count).wrapping_add(index));
                 let p = [owen_scramble(x, hash_combine(seed, 0)), owen_scramble(y, hash_combine(seed, 1))];
-                return step(p, frame);
+                std::array::from_fn(|k| p[k].wrapping_add(frame.wrapping_mul(R2_STEP[k])))
             }
-            Sequence::White | Sequence::Stratified | Sequence::R2 => (),
         }
-        let seed = hash_combine(hash_combine(hash_combine(seed, pixel[0]), pixel[1]), AO_DIRECTION);
-        if self == Sequence::R2 {
-            return step([hash_combine(seed, 0), hash_combine(seed, 1)], n);
-        }
-        let random = [n.wrapping_mul(2), n.wrapping_mul(2).wrapping_add(1)].map(|v| hash_combine(seed, v));
-        if self == Sequence::White {
-            return random;
-        }
-        let cell = owen_scramble(n << 28, hash_combine(seed, n >> 4)) >> 28;
-        [(cell & 3) << 30 | random[0] >> 2, (cell >> 2) << 30 | random[1] >> 2]
     }
 
     /// [`Sequence::get_2d`] as fractions in [0, 1).
@@ -75,10 +64,9 @@ mod tests {
         for pixel in [[3, 5], [100, 7]] {
             for first in [0, 2] {
                 let frames = |s: Sequence| (first * 16..first * 16 + 16).map(move |f| s.get_2d(9, pixel, f, 0, 1));
-                assert_eq!(counts(frames(Sequence::Stratified), 4), ones);
                 assert_eq!(counts(frames(Sequence::Sobol), 4), ones);
                 // four samples of four frames, likewise
-                let four = (0..16).map(|k| Sequence::Stratified.get_2d(9, pixel, 4 * first + k / 4, k % 4, 4));
+                let four = (0..16).map(|k| Sequence::Sobol.get_2d(9, pixel, 4 * first + k / 4, k % 4, 4));
                 assert_eq!(counts(four, 4), ones);
             }
         }

@@ -67,7 +67,6 @@ pub const STREAMS: &[&StreamShaders] = &[
 /// The mean over frames whose samples lie at different places within the pixels.
 pub static ANTIALIAS: ComputeShader = ComputeShader::new("antialias");
 /// A frame's occlusion rays, distributed over its pixels.
-pub static BUDGET: ComputeShader = ComputeShader::new("budget");
 /// Radiance of each pixel, of its filtered parts.
 pub static COMPOSE: ComputeShader = ComputeShader::new("compose");
 /// The spatial filter of radiance.
@@ -120,7 +119,6 @@ pub static TEMPORAL: ComputeShader = ComputeShader::new("temporal");
 /// The passes that trace no rays.
 pub const COMPUTE: &[&ComputeShader] = &[
     &ANTIALIAS,
-    &BUDGET,
     &COMPOSE,
     &DENOISE,
     &DISPLAY,

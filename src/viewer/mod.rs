@@ -2,14 +2,15 @@
 //! path-traced truth beside it.
 //!
 //! [`app`] is the state of the user interface and `panels` shows it; [`worker`] renders on a thread
-//! of its own what [`request`]s say. Neither knows a window: [`window`] has one; [`headless`] runs
-//! a [`script`] without one.
+//! of its own what [`request`]s say. Neither knows a window: [`window`] has one; with
+//! the feature `probes`, `headless` runs a `script` without one.
 
 pub mod app;
 pub mod browse;
 pub mod camera;
 pub mod dialog;
 mod file_kind;
+#[cfg(feature = "probes")]
 pub mod headless;
 pub mod layer;
 mod options;
@@ -18,6 +19,7 @@ pub mod panels;
 mod recent;
 pub mod request;
 mod rounding;
+#[cfg(feature = "probes")]
 pub mod script;
 pub mod technique;
 pub mod window;

@@ -164,7 +164,7 @@ impl Technique {
             Self::Preset(preset) => FrameSettings { preset: Some(preset), technique: None, ..own },
             Self::Gtao => {
                 let preset = own.preset.filter(|p| *p != Preset::Larsen).unwrap_or_default();
-                FrameSettings { preset: Some(preset), technique: Some(AoTechnique::Gtao), budget: None, ..own }
+                FrameSettings { preset: Some(preset), technique: Some(AoTechnique::Gtao), ..own }
             }
             Self::Buffer(mode) => {
                 let preset = own.preset.filter(|p| *p != Preset::Larsen).unwrap_or_default();
@@ -182,7 +182,7 @@ impl Technique {
             Self::Frames(integrator) => {
                 settings.integrator = Some(integrator);
                 let preset = own.preset.filter(|p| !matches!(p, Preset::Larsen | Preset::Reference)).unwrap_or_default();
-                FrameSettings { preset: Some(preset), technique: None, primary: None, budget: None, ..own }
+                FrameSettings { preset: Some(preset), technique: None, primary: None, ..own }
             }
             Self::Still(integrator) => {
                 settings.integrator = Some(integrator);

@@ -34,8 +34,7 @@ fn usage_errors() {
     refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is for pictures");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
-    refuses(&render(&["--preset", "larsen-fixed", "--budget", "variance"]), 64, "1 to 4 rays per pixel");
-    refuses(&render(&["--preset", "larsen", "--budget", "variance"]), 64, "--budget has no effect on --preset larsen");
+    refuses(&render(&["--preset", "larsen", "--history", "8"]), 64, "--history has no effect on --preset larsen");
     refuses(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
     refuses(&render(&["--size", "0x5"]), 64, "at least 1");
     refuses(&render(&["--size", "20000x20000"]), 64, "16384x16384 is the most");

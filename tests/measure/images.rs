@@ -1,7 +1,7 @@
 //! Metrics of images, and the parity judge.
 
 mod metrics {
-    use skylit::measure::metrics::{ImagePair, not_white};
+    use skylit::measure::metrics::ImagePair;
 
     fn pair<'a>(image: &'a [f32], reference: &'a [f32]) -> ImagePair<'a> {
         ImagePair::new(image, reference, 1, None).unwrap()
@@ -64,11 +64,6 @@ mod metrics {
         assert!(ImagePair::new(&[0.0; 6], &[0.0; 6], 4, None).is_err());
         assert!(ImagePair::new(&[0.0; 6], &[0.0; 6], 0, None).is_err());
         assert!(ImagePair::new(&[0.0; 6], &[0.0; 6], 3, Some(&[1.0; 6])).is_err());
-    }
-
-    #[test]
-    fn white_mask() {
-        assert_eq!(not_white(&[1.0, 0.99, 0.5, 1.0], &[1.0, 0.9, 1.0, 0.97], 1), [0.0, 1.0, 1.0, 1.0]);
     }
 }
 

@@ -97,7 +97,6 @@ fn half_lives() {
     close(half.fitted_half_life(), 1.0, 1e-5);
     // 1/2, 1/4, 1/8, 1/16, 1/32
     assert_eq!(half.gone(), Some(4));
-    close(half.ghosting_energy(), (1.0 - 0.25f64.powi(8)) / 3.0, 1e-6);
     // well defined below a frame and above many
     close(of(&[0.25]).half_life(), 0.5, 1e-12);
     close(of(&[2f64.powf(-1.0 / 32.0)]).half_life(), 32.0, 1e-9);

@@ -144,9 +144,9 @@ fn png_round_trip() {
 #[test]
 fn depth_grey() {
     let inf = f32::INFINITY;
-    assert_eq!(png::depth_to_grey(&[2.0, 4.0, 3.0, inf, 0.0, f32::NAN, -1.0]), [255, 0, 128, 0, 0, 0, 0]);
-    assert_eq!(png::depth_to_grey(&[5.0, inf]), [255, 0]);
-    assert_eq!(png::depth_to_grey(&[inf, inf]), [0, 0]);
+    assert_eq!(png::depth_to_unit(&[2.0, 4.0, 3.0, inf, 0.0, f32::NAN, -1.0]), [1.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(png::depth_to_unit(&[5.0, inf]), [1.0, 0.0]);
+    assert_eq!(png::depth_to_unit(&[inf, inf]), [0.0, 0.0]);
 }
 
 #[test]

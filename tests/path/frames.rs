@@ -402,7 +402,6 @@ fn gpu_frames_of_radiance_refuse_settings_of_occlusion() {
     };
     wrong(Preset::Larsen.settings(), "--preset larsen");
     wrong(Settings { technique: skylit::realtime::Technique::Gtao, ..plain(1) }, "--technique gtao");
-    wrong(Settings { budget: skylit::realtime::Budget::Variance, history: 8, ..plain(1) }, "--budget variance");
 }
 
 /// The Cornell box, whose lamp moves and turns, as do a point light and a spot.

@@ -6,7 +6,6 @@ mod common;
 
 mod bent;
 mod bias;
-mod budget;
 // it runs the program
 #[cfg(feature = "cli")]
 mod cli;

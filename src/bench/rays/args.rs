@@ -111,6 +111,8 @@ impl BenchRaysArgs {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use clap::Parser;
 
     use super::*;
@@ -155,7 +157,8 @@ mod tests {
                 && to_file.common.outputs.json_file().is_some()
                 && to_file.scenes == ["scene"]
         );
-        // a scene after --json is a scene
-        assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
+        assert_eq!(parse(&["--json", "A.JSON", "scene"]).common.outputs.json_file().unwrap(), Path::new("A.JSON"));
+        // a record takes no scene's place
+        assert!(Alone::try_parse_from(["bench", "--json", "scene.glb"]).unwrap_err().to_string().contains("ends in .json"));
     }
 }

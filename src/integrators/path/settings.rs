@@ -129,8 +129,8 @@ settings! {
 /// Options of a path-traced image.
 #[derive(Clone, Debug)]
 pub struct PathOptions {
-    /// Settings of samples, of one path each. A tile mask needs a black environment and
-    /// [`PathOptions::is_sharp`].
+    /// Settings of samples, of one path each. A tile mask needs a black environment,
+    /// and neither a lens nor a wide pixel filter.
     pub samples: SampleSettings,
     /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most
     /// [`MAX_DEPTH`].
@@ -397,11 +397,6 @@ impl PathOptions {
     /// The options' part of the JSON record.
     pub(super) fn record(&self) -> Map<String, Value> {
         self.described().into_iter().map(|(key, _, value)| (key.to_owned(), value)).collect()
-    }
-
-    /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
-    pub fn is_sharp(&self) -> bool {
-        self.samples.pixel_filter.is_within_pixel() && self.lens.is_none()
     }
 }
 

@@ -32,8 +32,8 @@ records! {
         unit: float,
         /// 0: the technique has no history, only a result.
         has_history: uint,
-        /// Maximum occlusion rays of a pixel and frame.
-        most_rays: float,
+        /// Occlusion rays of a pixel that is sampled in a frame.
+        rays_per_pixel: float,
         /// Bits `DISPLAY_*`.
         flags: uint,
         /// One of `TONE_MAP_*`, for radiance.

@@ -15,24 +15,6 @@ records! {
     "frame" values {
         /// Largest variance that a packed estimate holds, of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two.
         MAX_VARIANCE: float = 0.5;
-        /// Budget: index of the first of 64 sums of desired samples, at widely spaced levels.
-        SUMS_COARSE: uint = 0;
-        /// Budget: index of the first of 64 sums of desired samples, at levels between two of the coarse ones.
-        SUMS_FINE: uint = 64;
-        /// Budget: index of the sum of standard deviations.
-        SUMS_DEVIATION: uint = 128;
-        /// Budget: index of the number of pixels.
-        SUMS_PIXELS: uint = 129;
-        /// Budget: index of the number of rays listed.
-        SUMS_LISTED: uint = 130;
-        /// Budget: number of sums.
-        SUMS_COUNT: uint = 131;
-        /// Budget: desired samples are summed over one pixel in this many.
-        BUDGET_SHARE: uint = 16;
-        /// Flag of a filter step: its box extends along rows.
-        STEP_HORIZONTAL: uint = 1;
-        /// Flag of a filter step: its box extends along columns.
-        STEP_VERTICAL: uint = 2;
     };
 
     /// Parameters that all passes of a frame share: the cameras of this frame and of the previous one, the sampling settings, and the G-buffer. Parameters of a
@@ -64,7 +46,7 @@ records! {
         frame: uint,
         /// Seed of the sampler.
         seed: uint,
-        /// Occlusion rays of each pixel that is sampled in this frame; with a variance budget, the maximum.
+        /// Occlusion rays of each pixel that is sampled in this frame.
         rays_per_pixel: uint,
         /// One of `PATTERN_*`: which pixels are sampled in this frame.
         pattern: uint,

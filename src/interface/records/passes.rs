@@ -10,23 +10,14 @@ records! {
     AoTraceParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
-        /// Ambient visibility of each ray, a float: of the launch, or with a variance budget of the frame. Unused when each pixel has one ray.
+        /// Ambient visibility of each ray of the launch, a float. Unused when each pixel has one ray.
         samples: address,
         /// Estimates of this frame, 8 bytes per pixel.
         current: address,
         /// Bent normals of this frame, 3 floats per pixel; 0: unused.
         current_bent: address,
-        /// With a variance budget, 8 bytes per pixel: index of its first ray in its sequence (24 bits) and number of rays; maximum history length in samples. 0,
-        /// as the two that follow: all pixels have the same number of rays.
-        plan: address,
-        /// A `uint` per ray: pixel (28 bits) and index of the ray within the pixel.
-        list: address,
         /// A `uint`: number of occlusion rays of the frame.
         ray_count: address,
-        /// Maximum rays of a pixel in a frame, with a variance budget.
-        most_rays: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
     }
 
     /// Parameters of `gtao`.
@@ -53,26 +44,6 @@ records! {
         reserved: uint,
     }
 
-    /// Parameters of `budget`.
-    BudgetParams: Block(access: "readonly", align: 8) {
-        /// Address of the `FrameParams`.
-        frame: address,
-        /// 8 bytes per pixel, in tile order: standard deviation of one sample, number of samples.
-        desired_samples: address,
-        /// `SUMS_COUNT` uints, indexed by `SUMS_*`.
-        sums: address,
-        /// The rays of each pixel, as in `AoTraceParams`.
-        plan: address,
-        /// The pixel of each ray, as in `AoTraceParams`.
-        list: address,
-        /// A `uint` per pixel: rays traced in all frames so far.
-        taken: address,
-        /// One of `STAGE_*`.
-        stage: uint,
-        /// Maximum rays of a pixel in a frame.
-        most_rays: uint,
-    }
-
     /// Parameters of `temporal`.
     TemporalParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
@@ -87,8 +58,6 @@ records! {
         bent_history: address,
         /// Bent normals of the previous frame's history.
         previous_bent_history: address,
-        /// The rays of each pixel, as in `AoTraceParams`.
-        plan: address,
         /// `MovedRecord`s of this frame.
         moved: address,
         /// Number of `MovedRecord`s.
@@ -131,8 +100,6 @@ records! {
         bent_from: address,
         /// Output bent normals, 3 floats per pixel.
         bent_to: address,
-        /// Axes along which the box extends: `STEP_HORIZONTAL`, `STEP_VERTICAL`.
-        sides: uint,
         /// Distance between taps, pixels.
         stride: uint,
         /// Maximum number of taps to each side.
@@ -141,8 +108,6 @@ records! {
         samples: float,
         /// Convergence of the sampler: the variance of the mean of n samples falls as `n^-(1 + evenness)`.
         evenness: float,
-        /// Padding to a multiple of 8 bytes.
-        reserved: float,
     }
 
     /// Parameters of `resample`.

@@ -2,14 +2,13 @@
 
 use crate::error::Result;
 use crate::gpu::Recorder;
-use crate::interface::records::frame::SUMS_LISTED;
 use crate::interface::records::passes::AoTraceParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
-use crate::realtime::settings::{Budget, Settings};
+use crate::realtime::settings::Settings;
 use crate::shaders::{self, StreamShaders};
-use crate::tracer::{Push, Stream, Tracer};
+use crate::tracer::{Stream, Tracer};
 
 /// The pass.
 pub struct AoTrace {
@@ -17,7 +16,6 @@ pub struct AoTrace {
     params: Params<AoTraceParams>,
     /// Pixels have several samples, which `gather` averages.
     has_several: bool,
-    has_budget: bool,
     has_bent: bool,
 }
 
@@ -26,43 +24,28 @@ pub fn stream(settings: &Settings) -> &'static StreamShaders {
     if settings.attenuation().is_binary() { &shaders::AO_TRACE_ANY } else { &shaders::AO_TRACE_CLOSEST }
 }
 
-/// Parameters that distribute a frame's rays over pixels, shared by `ao_trace` and `gather`.
+/// Parameters of the rays of a frame, shared by `ao_trace` and `gather`.
 pub fn params(frame: &Frame, resources: &Resources) -> AoTraceParams {
     AoTraceParams {
         frame: frame.params,
         samples: resources.address(Resource::Samples),
         current: resources.address(Resource::Current),
         current_bent: resources.address(Resource::CurrentBent),
-        plan: resources.address(Resource::Plan),
-        list: resources.address(Resource::RayPixels),
         ray_count: resources.address(Resource::RayCount),
-        most_rays: frame.settings.most_rays(),
-        reserved: 0,
     }
 }
 
 /// Resources that it reads.
-pub const READS: &[Resource] = &[
-    Resource::FrameNumber,
-    Resource::Scene,
-    Resource::Guide,
-    Resource::Surface,
-    Resource::Normals,
-    Resource::Axes,
-    Resource::Plan,
-    Resource::RayPixels,
-    Resource::Sums,
-];
+pub const READS: &[Resource] =
+    &[Resource::FrameNumber, Resource::Scene, Resource::Guide, Resource::Surface, Resource::Normals, Resource::Axes];
 
 impl AoTrace {
     /// Compiles the pass.
     pub fn new(tracer: &Tracer, settings: &Settings) -> Result<Self> {
-        let has_budget = settings.budget == Budget::Variance;
         Ok(Self {
             stream: tracer.stream(stream(settings))?,
             params: Params::new(tracer.device(), "parameters of occlusion rays")?,
-            has_several: settings.rays_per_pixel > 1 || has_budget,
-            has_budget,
+            has_several: settings.rays_per_pixel > 1,
             has_bent: settings.bent,
         })
     }
@@ -83,11 +66,8 @@ impl Pass for AoTrace {
         self.params.write(&params(frame, resources))
     }
 
-    fn record(&self, r: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()> {
-        // with a variance budget only the device knows the number of rays
-        let listed = || resources.address(Resource::Sums) + 4 * u64::from(SUMS_LISTED);
-        let queued = if self.has_budget { listed() } else { 0 };
-        self.stream.record(r, &Push { queued, ..self.params.push(frame, range) });
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        self.stream.record(r, &self.params.push(frame, range));
         Ok(())
     }
 }

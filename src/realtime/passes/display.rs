@@ -134,7 +134,7 @@ impl Pass for DisplayPass {
             gain: display.exposure.exp2(),
             unit: display.unit,
             has_history: (frame.settings.technique != Technique::Larsen).into(),
-            most_rays: frame.settings.most_rays().max(frame.settings.rays_per_pixel) as f32,
+            rays_per_pixel: frame.settings.rays_per_pixel as f32,
             flags: if resources.buffer(Resource::Composed).is_some() { DISPLAY_RADIANCE } else { 0 },
             tone_map: display.tone_map as u32,
             reserved: 0,

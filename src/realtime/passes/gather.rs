@@ -8,7 +8,7 @@ use crate::interface::records::passes::AoTraceParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
-use crate::realtime::settings::{Budget, Settings};
+use crate::realtime::settings::Settings;
 use crate::shaders::{self, LANES};
 use crate::tracer::Tracer;
 
@@ -16,7 +16,7 @@ use crate::tracer::Tracer;
 pub struct Gather {
     pipeline: ComputePipeline,
     params: Params<AoTraceParams>,
-    /// Rays per pixel in the range; with a variance budget the range is one of pixels.
+    /// Rays per pixel in the range.
     rays_per_pixel: u32,
     has_bent: bool,
 }
@@ -28,7 +28,7 @@ impl Gather {
         Ok(Self {
             pipeline: shaders::GATHER.specialized(tracer.device(), &specialization)?,
             params: Params::new(tracer.device(), "parameters of gathering")?,
-            rays_per_pixel: if settings.budget == Budget::Variance { 1 } else { settings.rays_per_pixel },
+            rays_per_pixel: settings.rays_per_pixel,
             has_bent: settings.bent,
         })
     }

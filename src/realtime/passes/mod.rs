@@ -3,7 +3,6 @@
 
 pub mod antialias;
 pub mod ao_trace;
-pub mod budget;
 pub mod compose;
 pub mod debug;
 pub mod display;

@@ -36,14 +36,11 @@ pub fn stage(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Stage>
 impl Pass for Temporal {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Normals, Plan, PreviousPosition, Scene, Surface,
+            BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Normals, PreviousPosition, Scene, Surface,
         };
-        ResourceUse::new(
-            &[FrameNumber, Scene, Guide, Surface, Normals, PreviousPosition, Current, CurrentBent, Plan],
-            &[History],
-        )
-        .previous(&[Guide, History, BentHistory])
-        .and_writes(self.has_bent, &[BentHistory])
+        ResourceUse::new(&[FrameNumber, Scene, Guide, Surface, Normals, PreviousPosition, Current, CurrentBent], &[History])
+            .previous(&[Guide, History, BentHistory])
+            .and_writes(self.has_bent, &[BentHistory])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -55,7 +52,6 @@ impl Pass for Temporal {
             current_bent: resources.address(Resource::CurrentBent),
             bent_history: resources.address(Resource::BentHistory),
             previous_bent_history: resources.previous_address(Resource::BentHistory),
-            plan: resources.address(Resource::Plan),
             moved: self.moved.address(),
             moved_count: frame.moved.len() as u32,
             moved_weight: frame.settings.moved_weight,

@@ -30,7 +30,7 @@ impl Larsen {
             signal: &Self,
             settings: Settings { primary: Some(primary), ..*settings },
             frame_samples: FrameSamples::of_visibility(settings, pixels(size)),
-            extent: extent(tracer, block, settings),
+            extent: extent(tracer, block),
             stages,
             primary_reason,
         })

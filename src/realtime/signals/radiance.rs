@@ -56,7 +56,7 @@ impl Radiance {
         let is_matte = || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);
         let has_specular = options.white_sky.is_none() && !is_matte();
         let half_pixels = pixels.div_ceil(4);
-        let extent = Extent { pixels, tiled_pixels: block.rays().into(), half_pixels, ..Extent::default() };
+        let extent = Extent { pixels, half_pixels, ..Extent::default() };
         Ok(Pipeline {
             signal: &Self,
             settings: Settings {

@@ -7,12 +7,10 @@ use crate::raster::Primary;
 use crate::realtime::frame_samples::FrameSamples;
 use crate::realtime::graph::{Pass, Range, Stage};
 use crate::realtime::history::History;
-use crate::realtime::passes::{
-    antialias, ao_trace, budget, filter, gather, gbuffer, gtao, nlmeans, rest, rest_samples, temporal,
-};
+use crate::realtime::passes::{antialias, ao_trace, filter, gather, gbuffer, gtao, nlmeans, rest, rest_samples, temporal};
 use crate::realtime::plan::{FramePlan, Inputs, RestProgress, SamplePlacement, Signal};
 use crate::realtime::resources::{Extent, Resource};
-use crate::realtime::settings::{Budget, Settings, Technique};
+use crate::realtime::settings::{Settings, Technique};
 use crate::shaders::StreamShaders;
 use crate::tracer::Tracer;
 use crate::tracer::stream::launch_rays;
@@ -40,7 +38,7 @@ impl AmbientVisibility {
             signal: &Self,
             settings: Settings { primary: Some(primary), ..*settings },
             frame_samples,
-            extent: extent(tracer, block, settings),
+            extent: extent(tracer, block),
             stages: stages(tracer, block, settings, primary, frame_samples)?,
             primary_reason,
         })
@@ -52,7 +50,7 @@ impl AmbientVisibility {
 /// # Errors
 /// [`Error::Usage`].
 pub fn check_rays(block: Block, settings: &Settings) -> Result<()> {
-    let rays = u64::from(block.rays()) * u64::from(settings.most_rays().max(settings.rays_per_pixel));
+    let rays = u64::from(block.rays()) * u64::from(settings.rays_per_pixel);
     if rays > u64::from(u32::MAX) {
         return Err(Error::Usage(format!(
             "{} rays per pixel of {}x{}: a frame has 2^32 rays at most; use fewer, or a smaller image",
@@ -71,12 +69,10 @@ pub fn choose_primary(tracer: &Tracer, settings: &Settings, size: [u32; 2]) -> (
 }
 
 /// Returns the quantities from which the sizes of resources follow.
-pub fn extent(tracer: &Tracer, block: Block, settings: &Settings) -> Extent {
+pub fn extent(tracer: &Tracer, block: Block) -> Extent {
     Extent {
         pixels: pixels(block.size),
-        tiled_pixels: block.rays().into(),
         half_pixels: pixels(block.size.map(|n| n.div_ceil(2))),
-        most_rays: settings.most_rays().into(),
         launch_rays: launch_rays(&tracer.device().info).into(),
     }
 }
@@ -93,24 +89,15 @@ fn stages(
     let mut stages = vec![gbuffer::stage(tracer, block, settings, primary)?];
 
     // samples of the frame
-    match (settings.technique, settings.budget) {
-        (Technique::Gtao, _) => stages.push(gtao::stage(tracer, pixels)?),
-        (_, Budget::Variance) => {
-            stages.extend(budget::stages(tracer, block.rays(), settings)?);
-            stages.push(Stage::new(
-                vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)],
-                Range::launches(pixels * settings.most_rays(), 1, settings.launch_rays),
-            ));
-            stages.push(Stage::new(vec![Box::new(gather::Gather::new(tracer, settings)?)], Range::all(block.rays())));
+    if settings.technique == Technique::Gtao {
+        stages.push(gtao::stage(tracer, pixels)?);
+    } else {
+        let n = settings.rays_per_pixel;
+        let mut stage: Vec<Box<dyn Pass>> = vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)];
+        if n > 1 {
+            stage.push(Box::new(gather::Gather::new(tracer, settings)?));
         }
-        (_, Budget::Uniform) => {
-            let n = settings.rays_per_pixel;
-            let mut stage: Vec<Box<dyn Pass>> = vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)];
-            if n > 1 {
-                stage.push(Box::new(gather::Gather::new(tracer, settings)?));
-            }
-            stages.push(Stage::new(stage, Range::launches(block.rays() * n, n, settings.launch_rays)));
-        }
+        stages.push(Stage::new(stage, Range::launches(block.rays() * n, n, settings.launch_rays)));
     }
 
     // histories and their filter
