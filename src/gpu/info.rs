@@ -11,7 +11,7 @@ use super::result::Context;
 use crate::error::{Error, Result};
 
 /// The device limits that skylit depends on.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Limits {
     /// Number of invocations in a subgroup.
     pub subgroup_size: u32,
@@ -239,41 +239,9 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let graphics_family = family(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS);
     let queue_family = graphics_family.or_else(|| family(vk::QueueFlags::COMPUTE));
 
-    // features without which skylit cannot use the device
-    let mut missing_floor = Vec::new();
-    if !vulkan13 || faults::lacks("Vulkan 1.3") {
-        missing_floor.push("Vulkan 1.3".to_owned());
-    } else {
-        for (supported, name) in [
-            (f12.buffer_device_address, "bufferDeviceAddress"),
-            (f12.host_query_reset, "hostQueryReset"),
-            (f13.maintenance4, "maintenance4"),
-            (f13.synchronization2, "synchronization2"),
-        ] {
-            if supported == vk::FALSE || faults::lacks(name) {
-                missing_floor.push(name.to_owned());
-            }
-        }
-    }
-    if queue_family.is_none() {
-        missing_floor.push("a compute queue".to_owned());
-    }
-
-    // features without which it cannot rasterize
-    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_RASTER_BITS);
-    let missing_raster = [
-        (graphics_family.is_some(), "a queue for graphics and compute"),
-        (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
-        (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
-        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "render targets of format R32G32_UINT"),
-        (
-            is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT),
-            "depth images of format D32_SFLOAT",
-        ),
-    ];
-    let missing_raster = missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect();
-
-    // extensions for ray tracing, which are options
+    // requirements, and what is an option
+    let missing_floor = missing_floor(vulkan13, queue_family.is_some(), &f12, &f13);
+    let missing_raster = missing_raster(raw, physical, &properties, graphics_family.is_some(), &f13);
     let ray_tracing = RayTracingExtensions {
         acceleration_structure: f_structure.acceleration_structure == vk::TRUE,
         deferred_host_operations: has(khr::deferred_host_operations::NAME),
@@ -282,9 +250,6 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     };
 
     // limits and names
-    let memory = unsafe { raw.get_physical_device_memory_properties(physical) };
-    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
-    let device_memory = heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum();
     let kind = match properties.device_type {
         vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
         vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
@@ -292,12 +257,9 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         vk::PhysicalDeviceType::CPU => "cpu",
         _ => "other",
     };
-    let mut v13_limits = vk::PhysicalDeviceVulkan13Properties::default();
-    let mut v11_limits = vk::PhysicalDeviceVulkan11Properties::default();
-    if vulkan13 {
-        let mut p = vk::PhysicalDeviceProperties2::default().push_next(&mut v13_limits).push_next(&mut v11_limits);
-        unsafe { raw.get_physical_device_properties2(physical, &mut p) };
-    }
+    let max_allocation = if vulkan13 { max_allocation(raw, physical) } else { 0 };
+    let device_memory = device_memory(raw, physical);
+    let limits = Limits { max_allocation, device_memory, ..limits(&properties, &v11, &f13, &structure, &pipeline) };
     let api = properties.api_version;
     Ok(DeviceInfo {
         physical,
@@ -316,49 +278,125 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         buffer_device_address: vulkan13 && f12.buffer_device_address == vk::TRUE,
         ray_tracing,
         missing_raster,
-        limits: Limits {
-            subgroup_size: v11.subgroup_size,
-            subgroup_ballot: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-                && v11
-                    .subgroup_supported_operations
-                    .contains(vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT),
-            packets: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-                && v11.subgroup_supported_operations.contains(
-                    vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC,
-                )
-                && (8..=64).contains(&v11.subgroup_size)
-                && f13.compute_full_subgroups == vk::TRUE,
-            max_workgroups_x: properties.limits.max_compute_work_group_count[0],
-            max_image_side: [
-                properties.limits.max_image_dimension2_d,
-                properties.limits.max_framebuffer_width,
-                properties.limits.max_framebuffer_height,
-            ]
-            .into_iter()
-            .min()
-            .unwrap_or(0),
-            max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
-            device_memory,
-            max_push_constants: properties.limits.max_push_constants_size,
-            max_viewport_side: properties
-                .limits
-                .max_viewport_dimensions
-                .map(|n| n as f32)
-                .into_iter()
-                .fold(f32::INFINITY, f32::min),
-            viewport_range: properties.limits.viewport_bounds_range,
-            timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
-                properties.limits.timestamp_period
-            } else {
-                0.0
-            },
-            scratch_alignment: structure.min_acceleration_structure_scratch_offset_alignment,
-            shader_group_handle_size: pipeline.shader_group_handle_size,
-            shader_group_handle_alignment: pipeline.shader_group_handle_alignment,
-            shader_group_base_alignment: pipeline.shader_group_base_alignment,
-        },
+        limits,
         queue_family,
     })
+}
+
+/// Names of the features that the device lacks and skylit cannot do without.
+fn missing_floor(
+    vulkan13: bool,
+    has_queue: bool,
+    f12: &vk::PhysicalDeviceVulkan12Features,
+    f13: &vk::PhysicalDeviceVulkan13Features,
+) -> Vec<String> {
+    let mut missing_floor = Vec::new();
+    if !vulkan13 || faults::lacks("Vulkan 1.3") {
+        missing_floor.push("Vulkan 1.3".to_owned());
+    } else {
+        for (supported, name) in [
+            (f12.buffer_device_address, "bufferDeviceAddress"),
+            (f12.host_query_reset, "hostQueryReset"),
+            (f13.maintenance4, "maintenance4"),
+            (f13.synchronization2, "synchronization2"),
+        ] {
+            if supported == vk::FALSE || faults::lacks(name) {
+                missing_floor.push(name.to_owned());
+            }
+        }
+    }
+    if !has_queue {
+        missing_floor.push("a compute queue".to_owned());
+    }
+    missing_floor
+}
+
+/// Names of the features that the device lacks and rasterization needs.
+fn missing_raster(
+    raw: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    properties: &vk::PhysicalDeviceProperties,
+    has_graphics_queue: bool,
+    f13: &vk::PhysicalDeviceVulkan13Features,
+) -> Vec<String> {
+    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_RASTER_BITS);
+    let missing_raster = [
+        (has_graphics_queue, "a queue for graphics and compute"),
+        (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
+        (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
+        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "render targets of format R32G32_UINT"),
+        (
+            is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT),
+            "depth images of format D32_SFLOAT",
+        ),
+    ];
+    missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect()
+}
+
+/// Bytes of memory that is the device's own.
+fn device_memory(raw: &ash::Instance, physical: vk::PhysicalDevice) -> u64 {
+    // SAFETY: the physical device belongs to the living instance
+    let memory = unsafe { raw.get_physical_device_memory_properties(physical) };
+    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+    heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum()
+}
+
+/// Bytes of the largest buffer, which Vulkan 1.3 tells.
+fn max_allocation(raw: &ash::Instance, physical: vk::PhysicalDevice) -> u64 {
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut v13).push_next(&mut v11);
+    // SAFETY: the physical device belongs to the living instance
+    unsafe { raw.get_physical_device_properties2(physical, &mut properties) };
+    v13.max_buffer_size.min(v11.max_memory_allocation_size)
+}
+
+/// The limits that properties and features tell.
+fn limits(
+    properties: &vk::PhysicalDeviceProperties,
+    v11: &vk::PhysicalDeviceVulkan11Properties,
+    f13: &vk::PhysicalDeviceVulkan13Features,
+    structure: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR,
+    pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR,
+) -> Limits {
+    Limits {
+        subgroup_size: v11.subgroup_size,
+        subgroup_ballot: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT),
+        packets: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(
+                vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC,
+            )
+            && (8..=64).contains(&v11.subgroup_size)
+            && f13.compute_full_subgroups == vk::TRUE,
+        max_workgroups_x: properties.limits.max_compute_work_group_count[0],
+        max_image_side: [
+            properties.limits.max_image_dimension2_d,
+            properties.limits.max_framebuffer_width,
+            properties.limits.max_framebuffer_height,
+        ]
+        .into_iter()
+        .min()
+        .unwrap_or(0),
+        max_push_constants: properties.limits.max_push_constants_size,
+        max_viewport_side: properties
+            .limits
+            .max_viewport_dimensions
+            .map(|n| n as f32)
+            .into_iter()
+            .fold(f32::INFINITY, f32::min),
+        viewport_range: properties.limits.viewport_bounds_range,
+        timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
+            properties.limits.timestamp_period
+        } else {
+            0.0
+        },
+        scratch_alignment: structure.min_acceleration_structure_scratch_offset_alignment,
+        shader_group_handle_size: pipeline.shader_group_handle_size,
+        shader_group_handle_alignment: pipeline.shader_group_handle_alignment,
+        shader_group_base_alignment: pipeline.shader_group_base_alignment,
+        ..Default::default()
+    }
 }
 
 #[cfg(test)]

@@ -135,70 +135,15 @@ impl Writer {
         let materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
         let Textures { textures, images, samplers } = self.textures(&scene.textures, path)?;
 
-        // spheres become triangles, fewer for each the more there are
-        let spheres = scene.meshes.iter().map(|m| match &m.geometry {
-            Geometry::Triangles(_) => 0,
-            Geometry::Spheres(s) => s.len() as u64,
-        });
-        let spheres = spheres.sum::<u64>();
-        let level = icosphere::level(spheres).min(4);
-        let each = 20u64 << (2 * level);
-        self.written.triangles = scene.triangle_count() + scene.sphere_count() * each;
-        if spheres > 0 {
-            self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
-        }
-
-        // meshes, in their undeformed shape
+        let meshes = self.meshes(scene);
         let rig = scene.rig.as_ref();
-        let mut meshes = Vec::new();
-        for (m, mesh) in scene.meshes.iter().enumerate() {
-            let made;
-            let deformations = rig.map_or(&[][..], |r| &r.parts().deformations);
-            let deformation = deformations.iter().position(|d| d.mesh == m);
-            let triangles = match &mesh.geometry {
-                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.undeformed(d)) {
-                    Some(shape) => {
-                        made = undeformed(t, shape);
-                        &made
-                    }
-                    None => t,
-                },
-                Geometry::Spheres(s) => {
-                    made = tessellate(s, level);
-                    &made
-                }
-            };
-            let mut out = self.mesh(&mesh.name, triangles, mesh.material);
-            if let Some(d) = deformation {
-                self.deformation(&deformations[d], triangles.positions.len(), &mut out["primitives"][0]);
-            }
-            meshes.push(out);
-        }
 
         // nodes, and lights on those that carry them
         let mut tree = rig::tree(scene, rig);
         let mut nodes = std::mem::take(&mut tree.nodes);
         let mut roots = std::mem::take(&mut tree.roots);
         let free = nodes.len();
-        let mut lights = Vec::new();
-        for (k, light) in scene.lights.iter().enumerate() {
-            if matches!(light.kind, LightKind::Directional { angle } if angle > 0.0) {
-                let name = &light.name;
-                self.written
-                    .warnings
-                    .push(format!("light '{name}' loses its angular diameter: glTF's directional lights have none"));
-            }
-            let Some(written) = punctual(light) else {
-                let (name, kind) = (&light.name, light.kind.about().name);
-                self.written.warnings.push(format!("light '{name}' is left out: glTF has no {kind} lights"));
-                continue;
-            };
-            match tree.lights.get(&k) {
-                Some(&carrier) => put_light(&mut nodes[carrier], lights.len()),
-                None => nodes.push(light_node(light, lights.len())),
-            }
-            lights.push(written);
-        }
+        let lights = self.lights(scene, &tree, &mut nodes);
 
         // cameras that no node carries have one of their own
         let diagonal = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).length());
@@ -260,6 +205,74 @@ impl Writer {
         }
         self.json = json;
         Ok(())
+    }
+
+    /// All meshes in their undeformed shape, spheres as triangles.
+    fn meshes(&mut self, scene: &Scene) -> Vec<Value> {
+        // spheres become triangles, fewer for each the more there are
+        let spheres = scene.meshes.iter().map(|m| match &m.geometry {
+            Geometry::Triangles(_) => 0,
+            Geometry::Spheres(s) => s.len() as u64,
+        });
+        let spheres = spheres.sum::<u64>();
+        let level = icosphere::level(spheres).min(4);
+        let each = 20u64 << (2 * level);
+        self.written.triangles = scene.triangle_count() + scene.sphere_count() * each;
+        if spheres > 0 {
+            self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
+        }
+
+        // meshes, in their undeformed shape
+        let rig = scene.rig.as_ref();
+        let mut meshes = Vec::new();
+        for (m, mesh) in scene.meshes.iter().enumerate() {
+            let made;
+            let deformations = rig.map_or(&[][..], |r| &r.parts().deformations);
+            let deformation = deformations.iter().position(|d| d.mesh == m);
+            let triangles = match &mesh.geometry {
+                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.undeformed(d)) {
+                    Some(shape) => {
+                        made = undeformed(t, shape);
+                        &made
+                    }
+                    None => t,
+                },
+                Geometry::Spheres(s) => {
+                    made = tessellate(s, level);
+                    &made
+                }
+            };
+            let mut out = self.mesh(&mesh.name, triangles, mesh.material);
+            if let Some(d) = deformation {
+                self.deformation(&deformations[d], triangles.positions.len(), &mut out["primitives"][0]);
+            }
+            meshes.push(out);
+        }
+        meshes
+    }
+
+    /// The lights that glTF has; each is put on its node, which may be a new one.
+    fn lights(&mut self, scene: &Scene, tree: &rig::Tree, nodes: &mut Vec<Value>) -> Vec<Value> {
+        let mut lights = Vec::new();
+        for (k, light) in scene.lights.iter().enumerate() {
+            if matches!(light.kind, LightKind::Directional { angle } if angle > 0.0) {
+                let name = &light.name;
+                self.written
+                    .warnings
+                    .push(format!("light '{name}' loses its angular diameter: glTF's directional lights have none"));
+            }
+            let Some(written) = punctual(light) else {
+                let (name, kind) = (&light.name, light.kind.about().name);
+                self.written.warnings.push(format!("light '{name}' is left out: glTF has no {kind} lights"));
+                continue;
+            };
+            match tree.lights.get(&k) {
+                Some(&carrier) => put_light(&mut nodes[carrier], lights.len()),
+                None => nodes.push(light_node(light, lights.len())),
+            }
+            lights.push(written);
+        }
+        lights
     }
 
     /// Appends bytes as a buffer view of their own.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::scene::{
-    AlphaMode, Camera, Environment, Filter, Geometry, LightKind, Material, Projection, Scene, TextureSlot, Wrap,
+    AlphaMode, Camera, Environment, Filter, Geometry, Light, LightKind, Material, Projection, Scene, TextureSlot, Wrap,
 };
 
 /// Files below a folder: what is large, each in a file of its own.
@@ -35,7 +35,32 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
     let mut files = Files { folder, count: 0 };
 
-    // geometry in world space: peers need no instances
+    let [meshes, spheres] = geometry(scene, &mut files)?;
+    let (fov_y, half_height) = match camera.projection {
+        Projection::Perspective { fov_y } => (Some(fov_y), None),
+        Projection::Orthographic { half_height } => (None, Some(half_height)),
+    };
+
+    // all of it goes into one file, which names the others
+    let m = camera.camera_to_world;
+    let text = json!({
+        "size": size,
+        "camera": {"rotation": m.matrix3.transpose().to_cols_array(), "position": m.translation.to_array(),
+                   "fov_y": fov_y, "half_height": half_height},
+        "meshes": meshes,
+        "spheres": spheres,
+        "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
+        "textures": textures(scene, &mut files)?,
+        "environment": environment(scene, &mut files)?,
+        "lights": scene.lights.iter().map(light).collect::<Result<Vec<_>>>()?,
+    })
+    .to_string();
+    let path = folder.join("scene.json");
+    std::fs::write(&path, text).map_err(|e| Error::write(&path, &e))
+}
+
+/// Meshes and spheres in world space: peers need no instances.
+fn geometry(scene: &Scene, files: &mut Files) -> Result<[Vec<Value>; 2]> {
     let (mut meshes, mut spheres) = (Vec::new(), Vec::new());
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
@@ -73,8 +98,11 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
             }
         }
     }
+    Ok([meshes, spheres])
+}
 
-    // what surfaces and the surroundings look like
+/// The scene's textures, their texels in files.
+fn textures(scene: &Scene, files: &mut Files) -> Result<Vec<Value>> {
     let textures = scene.textures.iter().map(|t| {
         Ok(json!({
             // the peers' own format of 8 bits
@@ -85,8 +113,12 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
             "nearest": t.filter == Filter::Nearest,
         }))
     });
-    let textures = textures.collect::<Result<Vec<_>>>()?;
-    let environment = match &scene.environment {
+    textures.collect()
+}
+
+/// What surrounds the scene, the texels of a map in a file.
+fn environment(scene: &Scene, files: &mut Files) -> Result<Value> {
+    Ok(match &scene.environment {
         Environment::Black => Value::Null,
         Environment::Uniform(c) => json!({"radiance": c.to_array()}),
         Environment::Map(map) => json!({
@@ -96,47 +128,25 @@ pub fn write_peer_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: 
             "factor": map.factor.to_array(),
             "to_map": map.to_map.transpose().to_cols_array(),
         }),
-    };
-
-    // lights and the camera
-    let lights: Vec<Value> = scene
-        .lights
-        .iter()
-        .map(|l| {
-            let about = l.kind.about();
-            let missing = || Error::Scene(format!("light '{}': peers have no {} lights; leave it out", l.name, about.name));
-            let kind = about.gltf.ok_or_else(missing)?;
-            let (inner, outer) = match l.kind {
-                LightKind::Spot { inner_angle, outer_angle } => (inner_angle, outer_angle),
-                LightKind::Directional { angle } => (angle, 0.0),
-                _ => (0.0, 0.0),
-            };
-            let range = l.range.is_finite().then_some(l.range);
-            Ok(json!({"kind": kind, "intensity": l.intensity.to_array(), "position": l.position.to_array(),
-                      "direction": l.direction.to_array(), "inner": inner, "outer": outer, "range": range}))
-        })
-        .collect::<Result<_>>()?;
-    let (fov_y, half_height) = match camera.projection {
-        Projection::Perspective { fov_y } => (Some(fov_y), None),
-        Projection::Orthographic { half_height } => (None, Some(half_height)),
-    };
-
-    // all of it into one file, which names the others
-    let m = camera.camera_to_world;
-    let text = json!({
-        "size": size,
-        "camera": {"rotation": m.matrix3.transpose().to_cols_array(), "position": m.translation.to_array(),
-                   "fov_y": fov_y, "half_height": half_height},
-        "meshes": meshes,
-        "spheres": spheres,
-        "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
-        "textures": textures,
-        "environment": environment,
-        "lights": lights,
     })
-    .to_string();
-    let path = folder.join("scene.json");
-    std::fs::write(&path, text).map_err(|e| Error::write(&path, &e))
+}
+
+/// A light that glTF has, too.
+///
+/// # Errors
+/// [`Error::Scene`] for others.
+fn light(l: &Light) -> Result<Value> {
+    let about = l.kind.about();
+    let missing = || Error::Scene(format!("light '{}': peers have no {} lights; leave it out", l.name, about.name));
+    let kind = about.gltf.ok_or_else(missing)?;
+    let (inner, outer) = match l.kind {
+        LightKind::Spot { inner_angle, outer_angle } => (inner_angle, outer_angle),
+        LightKind::Directional { angle } => (angle, 0.0),
+        _ => (0.0, 0.0),
+    };
+    let range = l.range.is_finite().then_some(l.range);
+    Ok(json!({"kind": kind, "intensity": l.intensity.to_array(), "position": l.position.to_array(),
+              "direction": l.direction.to_array(), "inner": inner, "outer": outer, "range": range}))
 }
 
 fn slot(slot: &Option<TextureSlot>) -> Value {
