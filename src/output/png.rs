@@ -121,11 +121,6 @@ pub fn write(image: &Image, path: &Path, exposure: f32) -> Result<()> {
     write_bytes(path, bytes, image.width, image.height, colour)
 }
 
-/// Writes 8-bit grey values as they are, `width * height` of them.
-pub fn write_grey(path: &Path, grey: &[u8], width: u32, height: u32) -> Result<()> {
-    write_bytes(path, grey.to_vec(), width, height, Colour::Grey)
-}
-
 /// Writes 8-bit sRGB values as they are, three for each of `width * height` pixels.
 pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
     write_bytes(path, rgb.to_vec(), width, height, Colour::Rgb)

@@ -117,11 +117,6 @@ impl Check {
         Self { sentence: sentence.into(), ..self }
     }
 
-    /// The check as that of a tracer.
-    pub fn of(self, tracer: TracerKind) -> Self {
-        Self { tracer: Some(tracer), ..self }
-    }
-
     /// `compute`, or `cpu` for what no tracer does.
     pub fn tracer_name(&self) -> &'static str {
         self.tracer.map_or("cpu", TracerKind::name)

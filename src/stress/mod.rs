@@ -204,7 +204,9 @@ mod tests {
         };
         let good = [Check::at_most("a", 0.0, "", 1.0), Check::reported("b", 9.0, ""), Check::not_applicable("c", "no")];
         assert!(summary(good.to_vec()).verdict().is_ok());
-        let bad = summary(vec![Check::at_most("leaks of a box", 2.0, "", 0.0).of(TracerKind::Compute)]).verdict().unwrap_err();
+        let bad = summary(vec![Check { tracer: Some(TracerKind::Compute), ..Check::at_most("leaks of a box", 2.0, "", 0.0) }])
+            .verdict()
+            .unwrap_err();
         assert_eq!((bad.exit_code(), bad.to_string().as_str()), (1, "1 check fails: leaks of a box (compute)"));
     }
 }
