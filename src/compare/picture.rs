@@ -52,7 +52,7 @@ pub fn write(set: &ImageSet, kind: PictureKind, path: &Path) -> Result<Vec<PathB
 /// # Errors
 /// [`Error::Usage`] for a name that does not end in .png.
 pub fn paths(images: usize, reference: usize, path: &Path) -> Result<Vec<PathBuf>> {
-    if ImageFormat::of(path)? != ImageFormat::Png {
+    if ImageFormat::from_path(path)? != ImageFormat::Png {
         return Err(Error::Usage(format!("{}: a picture of differences is a .png", path.display())));
     }
     let judged: Vec<usize> = (0..images).filter(|k| *k != reference).collect();

@@ -73,7 +73,7 @@ impl Golden {
     /// [`Error::Input`] for a file that cannot be read.
     pub fn load(path: &Path) -> Result<Self> {
         let mut image = output::load(path)?;
-        if output::ImageFormat::of(path)? == output::ImageFormat::Png {
+        if output::ImageFormat::from_path(path)? == output::ImageFormat::Png {
             image.metadata.extend(png_text::read_metadata(path)?);
         }
         let reference = read_reference(&image).map_err(|message| Error::input(path, message))?;
@@ -123,7 +123,7 @@ impl Golden {
     /// # Errors
     /// [`Error::Output`].
     pub fn save(&self) -> Result<()> {
-        match output::ImageFormat::of(&self.path)? {
+        match output::ImageFormat::from_path(&self.path)? {
             // what it is read for, and nothing for other programs
             output::ImageFormat::Exr => {
                 output::exr::write_with(&self.image, &self.path, &ExrOptions { grey_as_rgb: false, ..Default::default() })
