@@ -44,8 +44,10 @@ const MAX_CIRCLE: usize = 4;
 const MAX_MACROS: usize = 20;
 
 /// Rooms whose names, documentation and phases are held to `voice.rs`.
-const VOICED: &[&str] =
-    &["accel", "cli", "files", "gpu", "measure", "memory", "oracle", "sampling", "scene", "terminal", "tracer", "viewer"];
+const VOICED: &[&str] = &[
+    "accel", "bench", "cli", "compare", "files", "gpu", "measure", "memory", "oracle", "output", "report", "sampling", "scene",
+    "stress", "terminal", "tracer", "verify", "viewer",
+];
 
 /// No folder holds this share of all lines.
 const MAX_SHARE: f64 = 0.15;

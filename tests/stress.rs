@@ -289,7 +289,7 @@ fn gpu_stress_catches_a_counter_that_stops() {
     let of = |share: f64, varied: bool| {
         let sum = share * f64::from(count);
         let squares = if varied { sum } else { sum * share };
-        counters::Sampled::of(&[sum; 100], &[squares; 100], count)
+        counters::Sampled::from_sums(&[sum; 100], &[squares; 100], count)
     };
     assert!(of(0.5, true).distance(&of(0.51, true)) < 4.5);
     assert!(of(0.5, true).distance(&of(0.6, true)) > 4.5);
@@ -308,7 +308,7 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
     let mut image = vec![0.25f32; 3 * 49];
     image[3 * 24] = 7.0;
     let is_far = |k: usize| k < 7;
-    let of = |image: &[f32]| hot_pixel::Spread::of(image, 0.25, 10.0, is_far);
+    let of = |image: &[f32]| hot_pixel::Spread::measure(image, 0.25, 10.0, is_far);
     assert_eq!((of(&image).unsound, of(&image).far), (0, 0));
     for (at, value, expected) in [(80, f32::NAN, (1, 0)), (80, 11.0, (1, 0)), (80, 0.2, (1, 0)), (3, 0.3, (0, 1))] {
         let mut bad = image.clone();
@@ -414,7 +414,7 @@ fn stress_finds_what_a_scene_has() {
     mesh.normals = vec![Vec3::NEG_Y; mesh.positions.len()];
     mesh.normals[first as usize] = Vec3::ZERO;
     flawed.instances.push(flawed.instances[0].clone());
-    let anatomy = scene::Anatomy::of(&flawed);
+    let anatomy = scene::Anatomy::from_scene(&flawed);
     assert_eq!(anatomy.step.0, 0.25);
     assert_eq!((anatomy.coincident, anatomy.coincident_instances, anatomy.degenerate), (3, 2, 1));
     assert!(anatomy.worst_aspect > 1e4 && anatomy.aspects[4..].iter().sum::<u64>() == 1, "{anatomy:?}");

@@ -1,4 +1,5 @@
-//! Measurements as charts of a report: time against error with its Pareto front, what varies along an axis, and rates against the size of scenes.
+//! Measurements as charts: time against error with its Pareto front, values along an axis, rates
+//! against the size of scenes.
 
 use super::record::{Better, FRAME, Measurement, REFERENCE, Record, SIZE, quantity};
 use crate::report::pareto::{BEYOND, dominated, front};
@@ -72,7 +73,7 @@ pub fn family(scene: &str) -> Option<&str> {
     number.parse::<u64>().ok().map(|_| family)
 }
 
-/// What falls as 1 / log n through the first of several points.
+/// The curve 1 / log n through the first of several points.
 fn log_law(points: &[Point]) -> Option<Series> {
     let (from, to) = (points.first()?, points.last()?.x);
     let at = |k: u32| from.x * (to / from.x).powf(f64::from(k) / f64::from(LAW_POINTS));
@@ -103,7 +104,7 @@ impl Group<'_> {
     fn time_against_error(&self) -> Option<Chart> {
         let mut points: Vec<Point> = Vec::new();
         for time in self.scalars(quantity::FRAME_TIME.name) {
-            // where the reference's error is all there is, the contestant's own is at most what was measured
+            // if the reference's error dominates, the contestant's own is at most the measured one
             let [known, measured] = [quantity::CORRECTED, quantity::RMSE].map(|q| self.scalar(&time.contestant, q.name));
             let Some(error) = known.or(measured) else { continue };
             let most = if known.is_some() { "" } else { ": at most this" };
@@ -193,7 +194,7 @@ impl Group<'_> {
         })
     }
 
-    /// Everything else that varies along an axis; of errors that are shown over time nothing is left.
+    /// Everything else along an axis, without errors that are shown over time.
     fn curves(&self, is_over_time: bool) -> Vec<Chart> {
         let is_left = |m: &&&Measurement| {
             let is_shown = is_over_time && (m.quantity == "time" || m.quantity.contains("RMSE"));

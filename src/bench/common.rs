@@ -66,9 +66,12 @@ pub struct OutputArgs {
 /// A parser of names of records. What follows `--json` may be a scene: no scene's name ends in
 /// .json, and no record takes a scene's place.
 fn record_file_parser() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| match files::has_extension(&path, "json") {
-        true => Ok(path),
-        false => Err("the name of a record ends in .json; without one, --json is the last option"),
+    PathBufValueParser::new().try_map(|path| {
+        if files::has_extension(&path, "json") {
+            Ok(path)
+        } else {
+            Err("the name of a record ends in .json; without one, --json is the last option")
+        }
     })
 }
 
@@ -92,10 +95,11 @@ impl OutputArgs {
         plan
     }
 
-    /// Checks that every output file can be written and replaces none of the records that are read, before anything that takes long. The plan has made the folder of the report.
+    /// Checks that output files can be written and replace no record that is read, before anything
+    /// that takes long. The plan has made the folder of the report.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a format of plots that there is not; those of [`FilePlan::check`] and [`files::check_writable`].
+    /// [`Error::Usage`] for an unknown format of plots; errors of the plan and its files.
     pub fn check(&self, records: &[PathBuf], baselines: &[PathBuf]) -> Result<FilePlan> {
         let mut plan = self.plan();
         records.iter().for_each(|path| plan.reads("a record", path));
@@ -119,7 +123,8 @@ impl OutputArgs {
         files::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
     }
 
-    /// Writes the plot and the page of records, if they are asked for; a plot that cannot be written does not prevent the page. Returns the address of the page.
+    /// Writes the plot and the page of records if requested, the page even if the plot fails.
+    /// Returns the page's address.
     pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
         let plot = self.plot.as_ref().map_or(Ok(()), |path| page::write_plot(path, records));
         let write =
@@ -143,19 +148,17 @@ pub fn show_address(pictures: Result<Option<String>>, console: Console) -> (Opti
 /// A record as JSON, with how it compares with its baseline.
 #[derive(Serialize)]
 pub struct JsonRecord<'a> {
-    /// What was measured.
     #[serde(flatten)]
     pub record: &'a Record,
     /// The comparison with an earlier record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<&'a BaselineReport>,
-    /// Address of the page.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<String>,
 }
 
 impl CommonArgs {
-    /// Checks the arguments before anything that takes long. The plan has made the folder of the report.
+    /// Checks the arguments before anything that takes long, and makes the report's folder.
     pub fn check(&self) -> Result<FilePlan> {
         let mut plan = self.plan();
         plan.check()?;
@@ -164,10 +167,10 @@ impl CommonArgs {
         Ok(plan)
     }
 
-    /// Checks that no output replaces a scene, a file that one refers to, the environment, or the list of peers.
+    /// Checks that no output replaces a scene, its files, the environment, or the list of peers.
     ///
     /// # Errors
-    /// [`Error::Usage`], naming both files; those of loading a scene, which is looked into where there is a file to be replaced.
+    /// [`Error::Usage`], naming both files; errors of scenes, read where files may be replaced.
     pub fn check_inputs(&self, scenes: &[String], environment: Option<&Path>, peers: Option<&str>) -> Result<()> {
         let mut plan = self.plan();
         scenes.iter().for_each(|scene| plan.reads("the scene", scene));
@@ -188,7 +191,7 @@ impl CommonArgs {
         plan
     }
 
-    /// Writes the JSON record and the CSV table, if they are asked for; one that cannot be written does not prevent the other.
+    /// Writes the JSON record and the CSV table if requested, each even if the other fails.
     pub fn write_tables(&self, json: &JsonRecord) -> Result<()> {
         let write_csv = |path: &Path| {
             let mut text = Vec::new();

@@ -10,7 +10,6 @@ use crate::gpu::{Device, DeviceInfo, Options};
 use crate::terminal::console::one_line;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer, TracerKind};
 
-/// An open device.
 pub struct BenchDevice {
     device: Arc<Device>,
 }
@@ -22,12 +21,10 @@ impl BenchDevice {
         Ok(Self { device: Device::open(&options)? })
     }
 
-    /// Properties of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.device.info
     }
 
-    /// For records.
     pub fn host_info(&self) -> HostInfo {
         HostInfo {
             version: env!("CARGO_PKG_VERSION").to_owned(),

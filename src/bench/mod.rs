@@ -1,9 +1,9 @@
-//! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
-//! real-time frames and its path tracing are.
+//! `skylit bench`: speed of tracers, frames in real time and path tracing, beside those of others.
 //!
-//! Each benchmark is a folder: `rays`, `frames`, `path`. What they share is beside them: `record` is the list of measurements that all of them make, `table`, `chart` and
-//! `page` show it, `baseline` compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the
-//! well-known scenes, `session` is a run under way, and `device` alone opens the device and builds tracers.
+//! Each benchmark is a folder: `rays`, `frames`, `path`. All make the measurements of `record`,
+//! which `table`, `chart` and `page` show, `baseline` compares with an earlier run, and `report`
+//! shows again. `peers` runs the programs of others, `scenes` knows well-known scenes, `session` is
+//! a run under way, and `device` alone opens the device and builds tracers.
 
 mod args;
 mod baseline;

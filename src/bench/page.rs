@@ -1,4 +1,4 @@
-//! Records as a page of a report and as a plot: tables, charts, host, notes, and how they compare with their baselines.
+//! Records as a page and as a plot: tables, charts, host, notes, and comparisons with baselines.
 
 use std::path::{Path, PathBuf};
 
@@ -10,9 +10,7 @@ use crate::report::{self, Chart, Page, Part, Section, Status};
 
 /// A record with the file that it was read from, and how it compares with a baseline.
 pub struct ReportedRecord {
-    /// The file.
     pub file: PathBuf,
-    /// What was measured.
     pub record: Record,
     /// The comparison, if a baseline of this benchmark is given.
     pub baseline: Option<BaselineReport>,
@@ -53,7 +51,7 @@ fn title(kind: BenchKind) -> &'static str {
     }
 }
 
-/// What the page answers, and what became of the baselines.
+/// The questions that the page answers, and the outcome of baselines.
 fn summary(reported: &[ReportedRecord]) -> String {
     let question = |r: &ReportedRecord| match r.record.benchmark {
         BenchKind::Rays => "How many rays a second each tracer traces.",
@@ -71,7 +69,7 @@ fn summary(reported: &[ReportedRecord]) -> String {
     questions.chain(judged).collect::<Vec<_>>().join(" ")
 }
 
-/// What all records have in common.
+/// The facts that all records have in common.
 fn facts(reported: &[ReportedRecord]) -> Vec<(String, String)> {
     let value = |name: &str, of_host: &dyn Fn(&HostInfo) -> String| {
         let values = chart::distinct(reported.iter().map(|r| of_host(&r.record.host)).filter(|v| !v.is_empty()));

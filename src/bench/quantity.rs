@@ -6,9 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Better {
-    /// Small ones.
     Less,
-    /// Great ones.
     More,
     /// Neither: it is not compared with a baseline.
     Neither,
@@ -17,11 +15,8 @@ pub enum Better {
 /// A quantity with its unit.
 #[derive(Clone, Copy, Debug)]
 pub struct Quantity<'a> {
-    /// Its name.
     pub name: &'a str,
-    /// Its unit.
     pub unit: &'a str,
-    /// Which values are better.
     pub better: Better,
 }
 
@@ -36,15 +31,13 @@ pub const fn plain<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
 }
 
 impl Quantity<'_> {
-    /// The same, not compared with a baseline.
+    /// The quantity without a comparison with baselines.
     pub const fn not_compared(self) -> Self {
         Self { better: Better::Neither, ..self }
     }
 }
 
-/// Time of a frame.
 pub const FRAME_TIME: Quantity = less("time", "ms");
-/// Time of an image.
 pub const IMAGE_TIME: Quantity = less("time", "s");
 /// Time to bring a structure up to date.
 pub const UPDATE_TIME: Quantity = less("update", "ms");
@@ -58,15 +51,10 @@ pub const PLAIN_RMSE: Quantity = plain("plain RMSE", "");
 pub const PLAIN_CORRECTED: Quantity = plain("corrected plain RMSE", "");
 /// Error before the filter.
 pub const UNFILTERED: Quantity = plain("unfiltered RMSE", "");
-/// Rays a second.
 pub const RATE: Quantity = Quantity { name: "rate", unit: "Mrays/s", better: Better::More };
-/// Rays of a frame.
 pub const RAYS: Quantity = plain("rays", "");
-/// Camera rays of a frame.
 pub const CAMERA_RAYS: Quantity = plain("camera rays", "");
 /// Differences of consecutive frames.
 pub const FLICKER: Quantity = less("flicker", "");
-/// Bytes of a hierarchy.
 pub const BYTES: Quantity = less("bytes a primitive", "");
-/// Nodes that a ray visits.
 pub const NODES: Quantity = less("nodes a ray", "");

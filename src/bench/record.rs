@@ -1,4 +1,4 @@
-//! What a benchmark found: a list of measurements, which becomes JSON and CSV, tables, charts and pages, and is compared with that of an earlier run.
+//! The results of a benchmark: measurements that become JSON, CSV, tables, charts and pages.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -20,12 +20,9 @@ use crate::terminal::console::one_line;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BenchKind {
-    /// Rays per second.
     #[default]
     Rays,
-    /// Frames in real time.
     Frames,
-    /// Path tracing.
     Path,
 }
 
@@ -40,15 +37,12 @@ impl BenchKind {
     }
 }
 
-/// What a benchmark ran on.
+/// The host of a benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct HostInfo {
-    /// Version of skylit.
     pub version: String,
-    /// Vulkan device.
     pub device: String,
-    /// Its driver.
     pub driver: String,
     /// Name of the host's processor; empty where the system does not say.
     pub cpu: String,
@@ -67,9 +61,7 @@ impl HostInfo {
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Record {
-    /// Which benchmark it is of.
     pub benchmark: BenchKind,
-    /// Host and device.
     #[serde(flatten)]
     pub host: HostInfo,
     /// Settings that results depend on, by name.
@@ -81,17 +73,16 @@ pub struct Record {
     /// Scenes, in the order in which they were measured.
     #[serde(default)]
     pub scenes: Vec<SceneRecord>,
-    /// Results.
     pub measurements: Vec<Measurement>,
     /// The time limit ended it.
     #[serde(default)]
     pub stopped_early: bool,
-    /// What was left out, and why.
+    /// Omissions, and why.
     #[serde(default)]
     pub notes: Vec<String>,
 }
 
-/// What is said of a scene beside its measurements.
+/// Texts about a scene beside its measurements.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SceneRecord {
@@ -99,7 +90,6 @@ pub struct SceneRecord {
     pub scene: String,
     /// Size, light and the like, in words.
     pub about: String,
-    /// What the measurements say, a line each.
     pub remarks: Vec<String>,
 }
 
@@ -115,42 +105,36 @@ pub struct Measurement {
     /// Where along an axis it was measured, for one of several along it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<Position>,
-    /// Name of the quantity.
     pub quantity: String,
-    /// Its unit; empty for plain numbers.
+    /// The unit; empty for plain numbers.
     pub unit: String,
-    /// Which values are better.
     pub better: Better,
     /// It is the result of another program, for which skylit is not to blame.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_peers: bool,
-    /// Its values.
     pub values: Values,
 }
 
-/// A place along an axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Position {
-    /// What varies: frames, samples per pixel, bounces.
+    /// The quantity along the axis: frames, samples per pixel, bounces.
     pub axis: String,
-    /// Its value.
     pub value: f64,
 }
 
 impl Measurement {
-    /// What it was measured of: scene, part, contestant, position.
+    /// The subject of the measurement: scene, part, contestant, position.
     pub fn row(&self) -> String {
         let at = self.at.as_ref().filter(|at| at.axis != SIZE).map(|at| format!("{} {}", at.axis, at.value));
         let names = [&self.scene, &self.part, &self.contestant].into_iter().filter(|n| !n.is_empty()).cloned();
         names.chain(at).collect::<Vec<_>>().join(", ")
     }
 
-    /// Quantity and unit.
     pub fn title(&self) -> String {
         if self.unit.is_empty() { self.quantity.clone() } else { format!("{}, {}", self.quantity, self.unit) }
     }
 
-    /// Position of a curve; `None` for a single result, as along the sizes of scenes, of which each has one.
+    /// Position of a curve; `None` for a single result, also along the sizes of scenes.
     pub fn along(&self) -> Option<&Position> {
         self.at.as_ref().filter(|at| at.axis != SIZE)
     }
@@ -301,7 +285,7 @@ impl Record {
     /// Reads a record that was saved as JSON.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is missing, that no benchmark wrote, or that an earlier version wrote.
+    /// [`Error::Input`] for a missing file, or one that this version's benchmarks did not write.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = files::read(path)?;
         let broken = |why: String| Error::input(path, format!("is no record of `skylit bench`: {why}"));
@@ -332,9 +316,9 @@ fn clean(value: &mut Value) {
     }
 }
 
-/// Greatest magnitude of what benchmarks measure, and the inverse of the least. Square roots, quotients and squares of such numbers are numbers.
+/// Greatest magnitude of measurements, and inverse of the least: squares and quotients stay finite.
 const MAX_MAGNITUDE: f64 = 1e100;
-/// Greatest count: beyond it `f64` has not every integer, and sums of counts have no room in 64 bits.
+/// Greatest count: larger ones are no integers in `f64`, and their sums overflow.
 const MAX_COUNT: u64 = 1 << 53;
 
 /// Says which number of a record no benchmark can have measured, and why; `None` if there is none.

@@ -1,4 +1,4 @@
-//! `skylit bench report`: saved records, shown, plotted and compared again without measuring anything.
+//! `skylit bench report`: saved records, shown, plotted and compared again without measuring.
 
 use std::path::PathBuf;
 
@@ -34,7 +34,6 @@ pub struct BenchReportArgs {
 #[derive(Serialize)]
 struct ReportJson<'a> {
     records: Vec<ReportedJson<'a>>,
-    /// Address of the page.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<String>,
 }
@@ -49,8 +48,8 @@ struct ReportedJson<'a> {
 /// Shows, plots and compares.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is no record; [`Error::Usage`] for a baseline of a benchmark that is not reported; [`Error::CheckFailed`] for results that are
-/// worse than a baseline's.
+/// [`Error::Input`] for a file that is no record; [`Error::Usage`] for a baseline of another
+/// benchmark; [`Error::CheckFailed`] for worse results.
 pub fn run(args: &BenchReportArgs) -> Result<(), Failure> {
     let console = args.outputs.console();
     let _plan = args.outputs.check(&args.records, &args.baseline)?;

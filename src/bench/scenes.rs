@@ -1,4 +1,4 @@
-//! Which scenes benchmarks measure unless others are named: built-in ones, and well-known files where these are there.
+//! Default scenes of benchmarks: built-in ones, and well-known files where these are there.
 
 use std::path::{Path, PathBuf};
 
@@ -15,9 +15,7 @@ const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";
 /// A perspective camera.
 #[derive(Clone, Copy, Debug)]
 pub struct LookAt {
-    /// World coordinates.
     pub eye: [f64; 3],
-    /// World coordinates.
     pub target: [f64; 3],
     /// Vertical field of view, degrees.
     pub fov_y: f64,
@@ -30,7 +28,6 @@ impl LookAt {
         Choice::LookAt { eye: self.eye.into(), target: self.target.into(), up: DVec3::Y, fov_y }
     }
 
-    /// The camera, upright.
     pub fn camera(&self) -> Camera {
         Camera::look_at(self.eye.into(), self.target.into(), DVec3::Y, self.fov_y.to_radians())
     }
@@ -59,7 +56,6 @@ pub struct WellKnownScene {
     pub on_plane: bool,
 }
 
-/// Sponza.
 pub const SPONZA: WellKnownScene = WellKnownScene {
     path: "sponza/sponza.glb",
     view: Some(SPONZA_NAVE),
@@ -78,7 +74,6 @@ pub const SPONZA: WellKnownScene = WellKnownScene {
 /// Along the nave, from inside.
 const SPONZA_NAVE: LookAt = LookAt { eye: [-120.0, 20.0, -5.0], target: [50.0, 35.0, 0.0], fov_y: 70.0 };
 
-/// The Stanford dragon.
 pub const DRAGON: WellKnownScene = WellKnownScene {
     path: "dragon/dragon.glb",
     view: Some(LookAt { eye: [0.065, 0.1857, 0.198], target: [-0.0059, 0.125, -0.0046], fov_y: 45.0 }),
@@ -91,7 +86,6 @@ pub const DRAGON: WellKnownScene = WellKnownScene {
     on_plane: false,
 };
 
-/// The Stanford bunny.
 pub const BUNNY: WellKnownScene = WellKnownScene {
     path: "bunny/bunny.glb",
     view: None,
@@ -104,7 +98,6 @@ pub const BUNNY: WellKnownScene = WellKnownScene {
     on_plane: true,
 };
 
-/// Khronos' FlightHelmet.
 pub const FLIGHT_HELMET: WellKnownScene = WellKnownScene {
     path: "flight_helmet/FlightHelmet.gltf",
     view: None,
@@ -117,11 +110,10 @@ pub const FLIGHT_HELMET: WellKnownScene = WellKnownScene {
     on_plane: false,
 };
 
-/// All of them.
 pub const WELL_KNOWN: [&WellKnownScene; 4] = [&SPONZA, &DRAGON, &BUNNY, &FLIGHT_HELMET];
 
 impl WellKnownScene {
-    /// The one of `scenes` that a file is, by its name and that of its folder: there are many a scene.glb.
+    /// The one of `scenes` that a file is, by its name and its folder's: many are called scene.glb.
     pub fn find(scenes: &[&'static Self], source: &str) -> Option<&'static Self> {
         let tail = |path: &Path| path.components().rev().take(2).map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
         // a path without a folder has one all the same
@@ -134,7 +126,6 @@ impl WellKnownScene {
 /// Scenes to measure.
 #[derive(Debug, Default)]
 pub struct SceneList {
-    /// As on the command line.
     pub sources: Vec<String>,
     /// Scenes of the default list that are unavailable.
     pub notes: Vec<String>,
@@ -142,17 +133,17 @@ pub struct SceneList {
 
 impl SceneList {
     /// These, and nothing else.
-    pub fn of<S: AsRef<str>>(sources: &[S]) -> Self {
+    pub fn from_sources<S: AsRef<str>>(sources: &[S]) -> Self {
         Self { sources: sources.iter().map(|s| s.as_ref().to_owned()).collect(), notes: Vec::new() }
     }
 
     /// The well-known scenes of `scenes` whose files exist.
     pub fn well_known(scenes: &[&WellKnownScene]) -> Self {
         let folder = shared_folder();
-        let (there, absent): (Vec<PathBuf>, Vec<PathBuf>) =
+        let (present, absent): (Vec<PathBuf>, Vec<PathBuf>) =
             scenes.iter().map(|k| folder.join(k.path)).partition(|p| p.is_file());
         let note = |p: &PathBuf| format!("{}: file not found, skipped (set SKYLIT_SHARED_SCENES to its folder)", p.display());
-        Self { sources: there.iter().map(|p| p.display().to_string()).collect(), notes: absent.iter().map(note).collect() }
+        Self { sources: present.iter().map(|p| p.display().to_string()).collect(), notes: absent.iter().map(note).collect() }
     }
 
     /// Two lists, one after the other.
@@ -163,7 +154,7 @@ impl SceneList {
     }
 }
 
-/// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
+/// Fails for a scene that does not exist, or for a wrong parameter of a built-in one.
 pub fn check_exists(source: &str) -> Result<()> {
     if files::has_extension(Path::new(source), "json") {
         return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
@@ -196,7 +187,7 @@ pub fn shared_folder() -> PathBuf {
     std::env::var_os("SKYLIT_SHARED_SCENES").map_or_else(|| Path::new("../shared/scenes").to_owned(), PathBuf::from)
 }
 
-/// An environment map with a sun: the one that is given, the shared one where it is there and `quick` is not wanted, or our own.
+/// An environment map with a sun: the given one, the shared one if there and not `quick`, or ours.
 pub fn sun_map(given: Option<&Path>, quick: bool) -> Result<EnvironmentMap> {
     let shared = shared_folder().join(SUN_MAP);
     match given {

@@ -23,15 +23,11 @@ const STEPS: u64 = 1000;
 
 /// A running benchmark, with its arguments and its record.
 pub struct Session<'a, A> {
-    /// Arguments of this benchmark.
     pub args: &'a A,
-    /// The device.
     pub device: BenchDevice,
-    /// Peers that started.
     pub peers: Vec<Peer>,
     /// Progress bar and Ctrl-C of long work.
     pub control: ProgressControl,
-    /// The results so far.
     pub record: Record,
     common: &'a CommonArgs,
     console: Console,
@@ -39,14 +35,13 @@ pub struct Session<'a, A> {
     start: Instant,
     /// Jobs that are done, and all of them.
     jobs: (u64, u64),
-    /// The first error.
     failure: Option<Error>,
     /// Keeps the folder of the report, which is removed with it while it is empty.
     _plan: FilePlan,
 }
 
 impl<'a, A> Session<'a, A> {
-    /// Opens the device. `record` makes the record that is filled: it has the settings already, which have to be those of the baseline.
+    /// Opens the device. `record` makes the record to fill, with the settings of the baseline.
     pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> Record) -> Result<Self> {
         let start = Instant::now();
         let plan = common.check()?;
@@ -73,7 +68,7 @@ impl<'a, A> Session<'a, A> {
         })
     }
 
-    /// Starts peers; those that do not start are left out with a note, and so are all where `specs` says why there are none.
+    /// Starts peers, or notes why they are left out, as all are where `specs` is a reason.
     pub fn start_peers(&mut self, specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
         let specs = match specs {
             Ok(specs) => specs,
@@ -104,10 +99,8 @@ impl<'a, A> Session<'a, A> {
         self.jobs = (0, count.max(1) as u64);
     }
 
-    /// Runs a job unless the time limit has passed. An error is noted and fails the run at the end; only errors that end the run are returned.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`], [`Error::DeviceLost`].
+    /// Runs a job unless the time limit has passed. Errors are noted and fail the run at the end;
+    /// only errors that end the run are returned.
     pub fn job(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
         if self.is_over() {
             self.leave_out(name);
@@ -184,18 +177,17 @@ impl<'a, A> Session<'a, A> {
         (move |share| advance(progress, jobs, share), &mut self.peers)
     }
 
-    /// Has the time limit passed?
     pub fn is_late(&self) -> bool {
         self.common.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
     }
 
-    /// Has the time limit passed with at least one result? The first result is measured in any case.
+    /// Has the time limit passed with at least one result? The first is measured in any case.
     pub fn is_over(&self) -> bool {
         self.is_late() && !self.record.is_empty()
     }
 
-    /// Writes and prints what was measured, whatever went wrong, and compares it with the baseline. `scenes_named`: a scene that failed fails the run even if another one did
-    /// not; `checked`: what follows from the record itself.
+    /// Writes and prints measurements, whatever went wrong, and compares them with the baseline.
+    /// `scenes_named`: a failed scene fails the run; `checked`: the outcome of the record itself.
     pub fn finish(self, measured: Result<()>, scenes_named: bool, checked: Result<()>) -> Result<(), Failure> {
         let Self { record, device, common, console, failure, control, peers, baseline, .. } = self;
         // before anything is printed

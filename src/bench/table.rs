@@ -1,4 +1,4 @@
-//! Measurements as tables: a table for each part of a scene, a row a contestant, a column a quantity or a place along an axis. In the terminal they are text.
+//! Measurements as tables, one for each part of a scene, with a row a contestant.
 
 use super::chart::distinct;
 use super::record::{Measurement, Record};
@@ -18,7 +18,7 @@ pub fn title(record: &Record) -> String {
     format!("{}{settings}{peers}; docs/bench-{name}.md explains the columns", record.host.line())
 }
 
-/// What is known of a scene: what it is, a table or more for each part, and what they say.
+/// The description of a scene, its tables, and remarks on them.
 pub fn scene_parts(record: &Record, scene: &str) -> Vec<Part> {
     let here: Vec<&Measurement> = record.measurements.iter().filter(|m| m.scene == scene).collect();
     let described = record.scenes.iter().find(|s| s.scene == scene);

@@ -138,7 +138,7 @@ impl AoVsPathArgs {
         self.plot.iter().for_each(|path| plan.writes("--plot", path));
         plan.check()?;
         if let Some(path) = &self.output {
-            if ImageFormat::of(path)? != ImageFormat::Exr {
+            if ImageFormat::from_path(path)? != ImageFormat::Exr {
                 return Err(Error::Usage(format!(
                     "--output {}: the name must end in .exr, which holds all layers",
                     path.display()

@@ -1,4 +1,4 @@
-//! What metadata of images say of how they were made, where they do not agree.
+//! Metadata of images about how they were made, where they do not agree.
 
 use super::{ImageSet, letter};
 use crate::output::Image;
@@ -6,9 +6,8 @@ use crate::output::Image;
 /// A metadata entry in which images differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DifferingEntry {
-    /// Its key.
     pub key: String,
-    /// Its value in each image; `None` where an image does not have it.
+    /// The value in each image; `None` where an image does not have it.
     pub values: Vec<Option<String>>,
 }
 
@@ -23,7 +22,7 @@ pub fn differing_metadata(set: &ImageSet) -> Vec<DifferingEntry> {
     entries.filter(|e| e.values.iter().any(|v| *v != e.values[0])).collect()
 }
 
-/// Entries that images of one view have in common, what they are called, and what helps where they differ.
+/// Entries that images of one view have in common, their names, and help where they differ.
 const VIEW: [(&str, &str, &str); 3] = [
     ("scene", "scene", "the difference is that of two scenes"),
     ("camera", "camera", "pixels do not show the same points; render both with one camera"),

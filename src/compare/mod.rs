@@ -1,5 +1,5 @@
-//! Images against a reference: files, or a scene rendered on the spot. [`ImageSet`] has the numbers, [`page`] makes a report of them, [`picture`] pictures of the
-//! differences.
+//! Images against a reference: files, or a scene rendered on the spot. [`ImageSet`] has the
+//! numbers, [`page`] makes a report of them, [`picture`] pictures of the differences.
 
 mod agreement;
 pub mod ao_versus_path;
@@ -22,13 +22,12 @@ pub const MAX_IMAGES: usize = 26;
 /// An image that takes part in a comparison.
 #[derive(Clone, Debug, Default)]
 pub struct Entry {
-    /// Its name, short: a file's name, or what was rendered.
+    /// A short name: of the file, or of the settings.
     pub name: String,
     /// More about it, a line: the path of its file, or the scene.
     pub description: String,
-    /// What the settings of a render left open and the scene decided, a sentence each.
+    /// A sentence for each setting that was left open and the scene decided.
     pub choices: Vec<String>,
-    /// The image.
     pub image: Image,
 }
 
@@ -37,11 +36,10 @@ pub struct Entry {
 pub struct ImageSet {
     /// The images: A, B, C, ...
     pub entries: Vec<Entry>,
-    /// Index of the reference.
     pub reference: usize,
     /// How each differs from the reference; `None` for the reference itself.
     pub comparisons: Vec<Option<Comparison>>,
-    /// What makes images differ that are otherwise alike, a sentence each.
+    /// A sentence for each reason why images that are otherwise alike differ.
     pub warnings: Vec<String>,
 }
 
@@ -64,10 +62,6 @@ pub fn parse_letter(text: &str) -> Result<usize, String> {
 
 impl ImageSet {
     /// Compares all images with number `reference` of them.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for fewer than two images, more than [`MAX_IMAGES`], or a reference that is none of them; those of [`comparison::compare`], which then name the
-    /// two images.
     pub fn new(entries: Vec<Entry>, reference: usize, options: &CompareOptions) -> Result<Self> {
         check_count(entries.len(), reference)?;
         let comparisons = entries.iter().enumerate().map(|(k, entry)| match k {
@@ -97,7 +91,7 @@ impl ImageSet {
 /// Checks, before anything is loaded or rendered, that there are images to compare.
 ///
 /// # Errors
-/// [`Error::Usage`] for fewer than two images, more than [`MAX_IMAGES`], or a reference that is none of them.
+/// [`Error::Usage`] for fewer than two images, more than [`MAX_IMAGES`], or no such reference.
 pub fn check_count(count: usize, reference: usize) -> Result<()> {
     let wrong = |text: String| Err(Error::Usage(text));
     match count {

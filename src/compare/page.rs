@@ -6,10 +6,8 @@ use crate::measure::comparison::Comparison;
 use crate::report::comparison::{self, NamedImage};
 use crate::report::{Cell, Column, Page, Part, Row, Section, Table, format_number};
 
-/// A page with the images, their differences and metrics, and the metadata in which they differ. `command`: the command line that asked for it.
-///
-/// # Errors
-/// Those of [`comparison::section`].
+/// A page with the images, their differences and metrics, and metadata in which they differ.
+/// `command`: the command line that was typed.
 pub fn page(set: &ImageSet, command: &str) -> Result<Page> {
     let names: Vec<String> = set.entries.iter().enumerate().map(|(k, e)| format!("{}: {}", letter(k), e.name)).collect();
     let images: Vec<NamedImage> = (set.entries.iter().zip(&names).zip(&set.comparisons))
@@ -60,7 +58,7 @@ fn summary(set: &ImageSet) -> String {
     set.judged().map(sentence).collect::<Vec<_>>().join(" ")
 }
 
-/// What all images have in common.
+/// The facts that all images have in common.
 fn facts(set: &ImageSet) -> Vec<(String, String)> {
     let first = &set.entries[0].image;
     let mut facts = vec![("size".to_owned(), format!("{}x{} pixels", first.width, first.height))];

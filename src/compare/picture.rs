@@ -1,6 +1,6 @@
 //! Pictures of differences, with a legend: the signed difference, and the FLIP map.
 //!
-//! Drawn with the fonts that this program carries, so that it needs neither a display nor fonts on the machine.
+//! The program's own fonts are used, so that neither a display nor fonts are needed.
 
 use std::path::{Path, PathBuf};
 
@@ -21,19 +21,19 @@ const BAR: [u32; 4] = [14, 30, 14, 44];
 /// Colour of pixels that are not compared, and of the strip.
 const PAPER: [u8; 3] = [255; 3];
 
-/// What a picture shows.
+/// The subject of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureKind {
     /// Image minus reference; of three channels the difference of their luminances.
     Difference,
-    /// FLIP of each pixel.
     Flip,
 }
 
-/// Writes a picture for each image that was compared with the reference: to `path`, or where there are several to `NAME.a.png`, `NAME.c.png`. Returns their paths.
+/// Writes a picture for each image but the reference: to `path`, or where there are several to
+/// `NAME.a.png`, `NAME.c.png`. Returns their paths.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that does not end in .png, and for FLIP of channels that are no colours; [`Error::Output`].
+/// [`Error::Usage`] for a name not in .png, and FLIP of channels without colour; [`Error::Output`].
 pub fn write(set: &ImageSet, kind: PictureKind, path: &Path) -> Result<Vec<PathBuf>> {
     let paths = paths(set.entries.len(), set.reference, path)?;
     for ((k, entry, comparison), path) in set.judged().zip(&paths) {
@@ -52,7 +52,7 @@ pub fn write(set: &ImageSet, kind: PictureKind, path: &Path) -> Result<Vec<PathB
 /// # Errors
 /// [`Error::Usage`] for a name that does not end in .png.
 pub fn paths(images: usize, reference: usize, path: &Path) -> Result<Vec<PathBuf>> {
-    if ImageFormat::of(path)? != ImageFormat::Png {
+    if ImageFormat::from_path(path)? != ImageFormat::Png {
         return Err(Error::Usage(format!("{}: a picture of differences is a .png", path.display())));
     }
     let judged: Vec<usize> = (0..images).filter(|k| *k != reference).collect();
@@ -124,6 +124,8 @@ fn with_legend(
         let start = 3 * row * full as usize;
         rgb[start..start + 3 * line.len()].copy_from_slice(line.as_flattened());
     }
+
+    // Draws the bar of colours.
     let [left, top, right, bottom] = BAR;
     for x in left..full - right {
         let c = color((x - left) as f32 / (full - right - left - 1) as f32);
@@ -132,6 +134,8 @@ fn with_legend(
             rgb[k..k + 3].copy_from_slice(&c);
         }
     }
+
+    // Writes the caption and the labels below the bar.
     register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .map_err(|_| failed("the font is broken"))?;
     let root = BitMapBackend::with_buffer(&mut rgb, (full, height)).into_drawing_area();

@@ -1,4 +1,4 @@
-//! Images that are rendered on the spot: settings from a line of words, and settings that all renders share.
+//! Images rendered on the spot: settings from lines of words, and settings that all share.
 
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -9,10 +9,11 @@ use crate::renderer::frames::frame_settings;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::settings::GivenSetting;
 
-/// The settings of renders: each line of words, like `ao --ao-radius 2 --spp 64`, over the settings that are shared. Of those each render has the ones that have an effect on it.
+/// The settings of renders: lines of words, like `ao --ao-radius 2 --spp 64`, over those shared
+/// settings that have an effect on them.
 ///
 /// # Errors
-/// [`Error::Usage`] for words that are no settings, settings that do not go together, and a shared setting that has no effect on any render.
+/// [`Error::Usage`] for words that are no settings, contradictions, and settings without effect.
 pub fn settings(words: &[&str], shared: &RenderSettings) -> Result<Vec<RenderSettings>> {
     let own = words.iter().map(|w| RenderSettings::from_words(w)).collect::<Result<Vec<_>>>()?;
     let given = shared.given();
@@ -54,8 +55,8 @@ fn applies(setting: &GivenSetting, settings: &RenderSettings) -> bool {
         && integrators::check(std::slice::from_ref(setting), settings.integrator(), frames.as_ref()).is_ok()
 }
 
-/// The settings of the first frame, where these settings show one picture of frames in real time, which is the last of many: as many as fill histories. `None` where settings say which frame, and of
-/// stills.
+/// The settings of the first frame, where settings show the last of many frames in real time, as
+/// many as fill histories. `None` where settings say which frame, and for stills.
 pub fn first_frame(settings: &RenderSettings) -> Option<RenderSettings> {
     settings.realtime_setting()?;
     let mut first = settings.clone();
@@ -66,17 +67,16 @@ pub fn first_frame(settings: &RenderSettings) -> Option<RenderSettings> {
 
 /// A render, and what there is to say of it.
 pub struct Rendered {
-    /// The image.
     pub image: Image,
     /// Which frame it is, of frames in real time.
     pub frame: Option<String>,
-    /// What settings left open and the scene decided, a sentence each.
+    /// A sentence for each setting that was left open and the scene decided.
     pub choices: Vec<String>,
-    /// Settings that were given and that the image hardly depends on, and what to do about it, in a sentence.
+    /// A sentence about given settings that the image hardly depends on, and what helps.
     pub without_effect: Option<String>,
 }
 
-/// Renders what settings describe: a still, the last one of a time line, or the last of frames in real time.
+/// Renders a still, the last one of a time line, or the last of frames in real time.
 ///
 /// # Errors
 /// Those of [`Renderer::still`] and [`Renderer::frames`].
@@ -91,6 +91,8 @@ pub fn render(renderer: &mut Renderer, settings: &RenderSettings, control: &mut 
         let still = renderer.still(settings, control)?;
         return Ok(Rendered { image: still.image, frame: None, choices: still.report.setup.choices, without_effect: None });
     }
+
+    // Renders all frames in real time, of which the last is shown.
     let converges = frame_settings(settings)?.converges();
     let mut frames = renderer.frames(settings, false, control)?;
     let (mut done, count) = (0u32, frames.count());
@@ -111,6 +113,8 @@ pub fn render(renderer: &mut Renderer, settings: &RenderSettings, control: &mut 
         (_, true) => format!("frame {count}, at rest"),
         (_, false) => format!("frame {number}, after {} others", count - 1),
     };
+
+    // Warns of filters that have done their work before the last frame.
     let has_converged = is_at_rest && converges && count > CONVERGED_FRAMES;
     let idle: Vec<String> = settings
         .frames
@@ -131,7 +135,7 @@ pub fn render(renderer: &mut Renderer, settings: &RenderSettings, control: &mut 
     Ok(Rendered { image, frame: Some(frame), choices, without_effect })
 }
 
-/// After more frames at rest than these, spatial filters of an image that converges reach no farther than a pixel.
+/// Frames at rest after which spatial filters of a converging image reach no farther than a pixel.
 const CONVERGED_FRAMES: u32 = 16;
 
 /// Adds the ids of pixels to what is rendered, for masks by instance.

@@ -49,7 +49,7 @@ impl ImageSet {
         lines
     }
 
-    /// What settings left open and the scene decided, a line each with the images that it is about.
+    /// A line for each choice that the scene made, with the images that it is about.
     fn choices(&self) -> Vec<String> {
         let mut choices: Vec<(&str, String)> = Vec::new();
         for (k, entry) in self.entries.iter().enumerate() {
@@ -109,7 +109,7 @@ impl ImageSet {
     }
 }
 
-/// The values of an object as columns: those of objects within it have a dot in their names, lists are in one column each.
+/// The values of an object as columns: those of objects within it have a dot in their names.
 fn flatten(name: &str, value: &Value, row: &mut Vec<(String, String)>) {
     let text = |value: &Value| match value {
         Value::Null => String::new(),

@@ -1,5 +1,4 @@
-//! APNG: animated PNG, 8-bit sRGB, for previews. It is written frame by frame and loops forever; programs without APNG support show
-//! the first frame.
+//! APNG, animated PNG for previews: 8-bit sRGB, written frame by frame, in an endless loop.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -23,7 +22,7 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// The delay for a frame rate in frames per second, in [0.001, 1000]: the simplest fraction within a millionth of it, or the nearest representable one.
+    /// The simplest delay for a frame rate in [0.001, 1000] Hz, or the nearest one representable.
     pub fn of_rate(frames_per_second: f64) -> Result<Self> {
         if !(0.001..=1000.0).contains(&frames_per_second) {
             return Err(Error::Usage(format!("{frames_per_second} frames a second: must be between 0.001 and 1000")));
@@ -46,16 +45,12 @@ impl Delay {
     }
 }
 
-/// Header of an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Animation {
-    /// Width and height of every frame, pixels.
     pub size: [u32; 2],
-    /// Colour type of every frame.
     pub colour: Colour,
-    /// Number of frames, at least 1.
+    /// The number of frames, at least 1.
     pub frames: u32,
-    /// Duration of each frame.
     pub delay: Delay,
 }
 
@@ -64,7 +59,7 @@ pub fn is_apng(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("apng"))
 }
 
-/// An animation that is being written. The file appears with [`ApngWriter::finish`]; dropped before, it leaves nothing behind.
+/// An animation being written. [`ApngWriter::finish`] makes the file; dropped before, none is left.
 pub struct ApngWriter {
     // declared before the file, so that it is dropped first and can still flush to it
     encoder: Writer<BufWriter<File>>,
@@ -78,8 +73,7 @@ impl ApngWriter {
     /// Starts an animation that will be `path`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an animation of no frames, no pixels, too many pixels, or a delay over 0; [`Error::Output`] where
-    /// `path` cannot be written.
+    /// [`Error::Usage`] for no frames, no or too many pixels, or a delay over 0; [`Error::Output`].
     pub fn create(path: &Path, animation: Animation) -> Result<Self> {
         let Animation { size: [width, height], colour, frames, delay } = animation;
         check_size(width, height)?;
@@ -108,8 +102,7 @@ impl ApngWriter {
     /// Adds the colour channels of an image as the next frame, brightened by `exposure` stops.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a frame too many, or one of another size or colour than the animation; [`Error::Output`] where it
-    /// cannot be written.
+    /// [`Error::Usage`] for a frame too many, or of another size or colour; [`Error::Output`].
     pub fn add(&mut self, image: &Image, exposure: f32) -> Result<()> {
         let (bytes, colour) = bytes_of(image, exposure, &self.path)?;
         if ([image.width, image.height], colour) != (self.animation.size, self.animation.colour) {
@@ -119,7 +112,7 @@ impl ApngWriter {
         self.add_bytes(&bytes)
     }
 
-    /// Adds 8-bit sRGB values as they are as the next frame: as many a pixel as the colour type has, rows from the top. Errors as [`ApngWriter::add`].
+    /// Adds a frame of 8-bit sRGB values, rows from the top. Errors as [`ApngWriter::add`].
     pub fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
         let Animation { size: [width, height], colour, frames, .. } = self.animation;
         if bytes.len() as u64 != u64::from(width) * u64::from(height) * colour.channels() as u64 {
@@ -141,7 +134,7 @@ impl ApngWriter {
     /// Finishes the animation and moves the file to its path.
     ///
     /// # Errors
-    /// [`Error::Usage`] when frames are missing, [`Error::Output`] where it cannot be written; then there is no file.
+    /// [`Error::Usage`] when frames are missing, [`Error::Output`]; then there is no file.
     pub fn finish(self) -> Result<()> {
         if self.added < self.animation.frames {
             return Err(self.wrong(&format!("{} of {} frames were written", self.added, self.animation.frames)));

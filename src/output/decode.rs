@@ -1,4 +1,4 @@
-//! Decoding of PNG, JPEG, WebP, TGA and BMP files with the crate image, and detection of those that end early, some of which it takes for whole.
+//! Decoding with the crate image, and detection of files that end early, which it takes for whole.
 
 use std::io::{Cursor, ErrorKind};
 
@@ -6,19 +6,16 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Imag
 
 use crate::memory::Budget;
 
-/// What is said of a file that ends before its image does.
+/// The message for a file that ends before its image does.
 pub(super) const ENDS_EARLY: &str = "ends early: it was cut off";
 
-/// Maximum size of a decoded image.
 #[derive(Clone, Copy, Debug)]
 pub struct MaxSize<'a> {
-    /// Width and height.
     pub side: u32,
-    /// Pixels of a decoded image for each byte of the file; `None` for any number. A file that promises more is broken, and believing it would only cost the memory.
+    /// Pixels for each byte of the file at most, or any number; more are in broken files.
     pub pixels_per_byte: Option<u64>,
-    /// What the image is taken from.
     pub budget: &'a Budget,
-    /// Bytes of a pixel of this kind: those that are kept, and those that are needed besides until they are made.
+    /// Bytes of a pixel of this kind: those kept, and those needed besides while decoding.
     pub pixel_bytes: fn(ColorType) -> [u64; 2],
 }
 
@@ -65,48 +62,49 @@ fn decode_as_is(bytes: &[u8], format: ImageFormat, max: MaxSize) -> Result<Dynam
 /// Whether a file lacks what ends all files of its format.
 fn lacks_end(bytes: &[u8], format: ImageFormat) -> bool {
     match format {
-        ImageFormat::Jpeg => JpegEnd::of(bytes) != JpegEnd::Marked,
+        ImageFormat::Jpeg => JpegEnd::from_bytes(bytes) != JpegEnd::Marked,
         ImageFormat::Png => !bytes.windows(4).any(|chunk| chunk == b"IEND"),
         _ => false,
     }
 }
 
-/// Whether a WebP has fewer bytes than its header says. The byte that makes its length even may be missing.
+/// Has a WebP fewer bytes than its header says? The byte that makes its length even may be missing.
 fn is_webp_cut_off(bytes: &[u8]) -> bool {
     let size = bytes.get(4..8).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
     bytes.starts_with(b"RIFF") && (bytes.len() as u64) + 1 < u64::from(size) + 8
 }
 
-/// Whether the pixels of a JPEG end before the image does: its decoder makes up the others, and says nothing. `decode` decodes other bytes.
+/// Do the pixels of a JPEG end before the image does? The decoder invents the others silently.
 ///
-/// A file whose end marker alone is missing is whole. Whether that is so shows in pixels that change with what stands in place of the missing bytes.
+/// A file that lacks its end marker alone is whole. Otherwise pixels change with what is put in
+/// place of the missing bytes. `decode` decodes such bytes.
 fn is_jpeg_cut_off(bytes: &[u8], decode: impl Fn(&[u8]) -> Option<DynamicImage>) -> bool {
     const END: [u8; 2] = [0xff, 0xd9];
-    match JpegEnd::of(bytes) {
+    match JpegEnd::from_bytes(bytes) {
         JpegEnd::Marked => false,
         // refinements may follow, whose number the file does not say
         JpegEnd::Missing { is_progressive: true } => true,
         JpegEnd::Missing { is_progressive: false } => {
             // downloads that failed may be filled up with zeros
-            let there = bytes.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
-            let [a, b] = [0x00, 0x55].map(|byte| decode(&[&bytes[..there], &[byte; 64], &END].concat()));
+            let length = bytes.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
+            let [a, b] = [0x00, 0x55].map(|byte| decode(&[&bytes[..length], &[byte; 64], &END].concat()));
             a.is_none() || a != b
         }
     }
 }
 
-/// How a JPEG ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum JpegEnd {
     /// With the marker of the end of the image.
     Marked,
-    /// Without.
-    Missing { is_progressive: bool },
+    Missing {
+        is_progressive: bool,
+    },
 }
 
 impl JpegEnd {
     /// Follows the segments of a file (ITU T.81, B.1).
-    fn of(bytes: &[u8]) -> Self {
+    fn from_bytes(bytes: &[u8]) -> Self {
         const END_OF_IMAGE: u8 = 0xd9;
         const PROGRESSIVE: [u8; 4] = [0xc2, 0xc6, 0xca, 0xce];
         if bytes.ends_with(&[0xff, END_OF_IMAGE]) {
@@ -173,11 +171,11 @@ mod tests {
     fn a_jpeg_without_its_last_marker_is_whole() {
         let whole = encoded(ImageFormat::Jpeg);
         let image = decode(&whole, ImageFormat::Jpeg).unwrap();
-        assert_eq!(JpegEnd::of(&whole), JpegEnd::Marked);
+        assert_eq!(JpegEnd::from_bytes(&whole), JpegEnd::Marked);
         // what others append to a file
-        assert_eq!(JpegEnd::of(&[&whole[..], b"\0\0 and more"].concat()), JpegEnd::Marked);
+        assert_eq!(JpegEnd::from_bytes(&[&whole[..], b"\0\0 and more"].concat()), JpegEnd::Marked);
         let without = &whole[..whole.len() - 2];
-        assert_eq!(JpegEnd::of(without), JpegEnd::Missing { is_progressive: false });
+        assert_eq!(JpegEnd::from_bytes(without), JpegEnd::Missing { is_progressive: false });
         assert_eq!(decode(without, ImageFormat::Jpeg).unwrap(), image);
         // zeros in place of what is missing
         let mut zeros = whole.clone();

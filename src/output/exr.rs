@@ -1,8 +1,9 @@
 //! OpenEXR: one part, all channels with 32 bits and lossless unless [`ExrOptions`] say otherwise.
 //!
-//! A layer is the prefix of a channel's name (`depth.Z`, `position.X`), as the format has it. Metadata entries are text
-//! attributes called `skylit.KEY`, but [`WORLD_TO_CAMERA`] and [`WORLD_TO_NDC`], which are the standard's matrices. A grey image has its channel `Y` also as `R`,
-//! `G` and `B`, for programs that look for these alone; [`read`] drops the copies. The same image gives the same bytes.
+//! A layer is the prefix of a channel's name (`depth.Z`, `position.X`). Metadata entries are text
+//! attributes called `skylit.KEY`, but [`WORLD_TO_CAMERA`] and [`WORLD_TO_NDC`], the standard's
+//! matrices. A grey image has its channel `Y` also as `R`, `G` and `B`, for programs that look for
+//! these alone; [`read`] drops the copies. The same image gives the same bytes.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
@@ -30,15 +31,15 @@ use crate::memory::Budget;
 
 /// First bytes of a file.
 pub const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-/// Metadata key of the upper left corner of the display window, `x,y`, of files in which that is not 0,0. Pixels are counted from it.
+/// Metadata key of the display window's upper left corner, `x,y`, from which pixels are counted.
 pub const DISPLAY_ORIGIN: &str = "displayWindow.origin";
-/// Memory that pixels take at most which are in the display window and not in the file, bytes: a header alone must not decide how much is taken.
+/// Maximum bytes of pixels outside of the data window: a header alone must not decide how many.
 const MAX_PADDING: u64 = 2 << 30;
 /// Prefix of the attributes that hold metadata.
 const PREFIX: &str = "skylit.";
-/// Metadata key of the matrix from world space to camera space (x right, y up, looking along -z): 16 numbers as [`matrix_text`] writes them.
+/// Metadata key of the matrix from world to camera space (x right, y up, looking along -z).
 pub const WORLD_TO_CAMERA: &str = "worldToCamera";
-/// Metadata key of the matrix from world space to normalized device coordinates: x and y are -1 to 1 inside of the image, y up, after a division by w.
+/// Metadata key of the matrix from world space to normalized device coordinates, y up.
 pub const WORLD_TO_NDC: &str = "worldToNDC";
 /// Samples of each pixel; unsigned integers in files of earlier versions.
 const SAMPLES: &str = "samples";
@@ -46,9 +47,8 @@ const SAMPLES: &str = "samples";
 /// How an EXR file is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExrOptions {
-    /// Colours, alpha, normals and albedo have 16 bits ([`is_half`]). Finite values beyond 65504 become 65504.
+    /// Colours, alpha, normals and albedo have 16 bits ([`is_half`]), at most 65504 if finite.
     pub half: bool,
-    /// Compression.
     pub compression: ExrCompression,
     /// A grey image has its channel `Y` as `R`, `G` and `B`, too.
     pub grey_as_rgb: bool,
@@ -81,8 +81,8 @@ impl From<ExrCompression> for Compression {
     }
 }
 
-/// Does a channel have 16 bits where [`ExrOptions::half`] is set? Colours, alpha, albedo, and directions do; depths, positions, ids, counts, variances and the film's state need
-/// all bits that they have.
+/// Does a channel have 16 bits with [`ExrOptions::half`]? Colours, alpha and directions do; depths,
+/// positions, ids, counts, variances and the film's state need all their bits.
 pub fn is_half(channel: &str) -> bool {
     let layer = channel.split_once('.').map(|(layer, _)| layer);
     match layer {
@@ -91,22 +91,18 @@ pub fn is_half(channel: &str) -> bool {
     }
 }
 
-/// The text of a matrix in metadata: 16 numbers separated by commas, in the order of EXR files, whose matrices are multiplied from the right with rows (a translation is in the
-/// last four).
+/// The text of a matrix in metadata: 16 numbers in the order of EXR files, whose matrices are
+/// multiplied from the right with rows (a translation is in the last four).
 pub fn matrix_text(matrix: &Matrix4x4) -> String {
     matrix.map(|v| v.to_string()).join(",")
 }
 
-/// Reads [`matrix_text`].
 fn matrix_of(text: &str) -> Option<Matrix4x4> {
     let values = text.split(',').map(|v| v.trim().parse().ok()).collect::<Option<Vec<f32>>>()?;
     values.try_into().ok()
 }
 
 /// Writes an image with all its channels and metadata, 32 bits and lossless.
-///
-/// # Errors
-/// Those of [`write_with`].
 pub fn write(image: &Image, path: &Path) -> Result<()> {
     write_with(image, path, &ExrOptions::default())
 }
@@ -114,7 +110,7 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
 /// Writes an image with all its channels and metadata.
 ///
 /// # Errors
-/// [`Error::Usage`] for an image that contradicts itself or a metadata entry that the format cannot have, [`Error::Output`].
+/// [`Error::Usage`] for a contradictory image or metadata unfit for the format, [`Error::Output`].
 pub fn write_with(image: &Image, path: &Path, options: &ExrOptions) -> Result<()> {
     image.check()?;
     check_size(image.width, image.height)?;
@@ -147,7 +143,7 @@ fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()
             _ => drop(attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)))),
         }
     }
-    // Blocks in order of their rows whichever thread finishes first: the same image gives the same bytes.
+    // blocks in order of their rows, whichever thread finishes first: the bytes are always the same
     let encoding =
         Encoding { compression: options.compression.into(), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = (image.width as usize, image.height as usize);
@@ -177,7 +173,7 @@ fn string(t: &Text) -> String {
     String::from_utf8_lossy(t.as_slice()).into_owned()
 }
 
-/// Puts the attributes of the header, which the library writes in the order of a hash table, in the order of their names.
+/// Sorts the attributes of the header by name: the library writes them in a hash table's order.
 fn sort_attributes(file: &mut File) -> io::Result<()> {
     const MAGIC_AND_VERSION: u64 = 8;
     file.seek(SeekFrom::Start(MAGIC_AND_VERSION))?;
@@ -209,7 +205,7 @@ fn sort_attributes(file: &mut File) -> io::Result<()> {
     file.write_all(&attributes.into_iter().flat_map(|a| a.1).collect::<Vec<_>>())
 }
 
-/// Lets the library read the samples where they lie: a copy of a large image would double its memory.
+/// Samples that the library reads where they lie: copies of large images would double the memory.
 struct Borrowed<'a> {
     samples: &'a Samples,
     /// Floats have 16 bits.
@@ -223,7 +219,7 @@ struct RowWriter<'a> {
     width: usize,
 }
 
-/// The nearest half float; the largest one for finite values beyond it, so that they do not become infinite.
+/// The nearest half float; the largest one for finite values beyond it, not infinity.
 fn half(value: f32) -> f16 {
     let largest = f16::MAX.to_f32();
     f16::from_f32(if value.is_finite() { value.clamp(-largest, largest) } else { value })
@@ -266,16 +262,12 @@ impl SamplesWriter for RowWriter<'_> {
     }
 }
 
-/// Reads an EXR with all its channels (16-bit floats are converted to 32-bit ones) and its `skylit.` metadata, sorted by key. In a
-/// file with several parts, a part's name becomes the prefix of its channels' names.
+/// Reads an EXR with all its channels, as 32-bit floats, and its `skylit.` metadata, sorted by key.
+/// The names of several parts become prefixes of their channels' names.
 ///
-/// The image is what the display window shows: pixels are where the data window puts them, those outside of the display window (overscan) are left out, and those of it that the
-/// file does not have are 0.
+/// The image is what the display window shows: overscan is left out, missing pixels are 0.
 ///
-/// Of images of skylit the copies of a grey image's channel are left out, and `samples` are floats whatever version wrote them.
-///
-/// # Errors
-/// [`Error::Input`].
+/// Copies of a grey image's channel are left out, and `samples` are floats whatever the version.
 pub fn read(path: &Path) -> Result<Image> {
     read_within(path, &Budget::default())
 }
@@ -290,8 +282,8 @@ pub fn read_within(path: &Path, budget: &Budget) -> Result<Image> {
         .unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
 }
 
-/// Bytes that a part's pixels take at least, whatever they are: a few damaged bytes of a header must not make the decoder take gigabytes. An entry of the table of blocks has 8 bytes, a
-/// block's own header as many or more.
+/// Minimum bytes of a part's pixels: a damaged header must not make the decoder take gigabytes. An
+/// entry of the table of blocks has 8 bytes, a block's own header as many or more.
 fn least_bytes(header: &Header) -> u64 {
     let pixels = header.layer_size.0 as u64 * header.layer_size.1 as u64;
     let of_channel = |c: &ChannelDescription| {
@@ -313,9 +305,9 @@ fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
         Compression::ZIP1 | Compression::ZIP16 => DEFLATE,
         // floats are cut to three bytes first
         Compression::PXR24 => DEFLATE * 4 / 3,
-        // Huffman codes of words of two bytes: a run of at most 255 is a code of a bit or more, and eight
+        // Huffman codes of two-byte words: a run of at most 255 is a code of a bit, and eight
         Compression::PIZ => (255_u64 * 2 * 8).div_ceil(9),
-        // blocks of 4 x 4 halves that are all alike take three bytes; other samples are not compressed
+        // blocks of 4 x 4 equal halves take three bytes; other samples are not compressed
         Compression::B44 | Compression::B44A if samples == SampleType::F16 => 32_u64.div_ceil(3),
         Compression::B44 | Compression::B44A => 1,
         // some channels have run lengths, deflated
@@ -323,8 +315,8 @@ fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
     }
 }
 
-/// Whether a block has more in its header than its pixels can. Blocks of the methods DWAA and DWAB begin with eleven numbers of 64 bits, of which the second to the tenth are numbers of bytes and values;
-/// the decoder takes memory for as many.
+/// Has a block more in its header than its pixels can? Blocks of DWAA and DWAB begin with eleven
+/// numbers of 64 bits; the decoder takes memory for as much as the second to the tenth say.
 fn has_block_that_is_too_large(file: Cursor<&[u8]>, meta: &MetaData) -> exr::error::Result<bool> {
     let has_sizes = |h: &Header| matches!(h.compression, Compression::DWAA(_) | Compression::DWAB(_));
     if !meta.headers.iter().any(has_sizes) {
@@ -348,7 +340,7 @@ fn has_block_that_is_too_large(file: Cursor<&[u8]>, meta: &MetaData) -> exr::err
         if bytes.len() == size.area() * header.channels.bytes_per_pixel {
             continue;
         }
-        // cosine transforms are of 8 x 8 pixels; of four bytes a value, and what deflating adds where nothing is gained
+        // transforms are of 8 x 8 pixels; four bytes a value, and what deflating adds at worst
         let values = (size.0.next_multiple_of(8) * size.1.next_multiple_of(8) * header.channels.list.len()) as u64;
         let most = 8 * values + 4096;
         let mut sizes = bytes.chunks_exact(8).take(10).skip(1);
@@ -383,7 +375,7 @@ impl Window {
         self.size.0 as u128 * self.size.1 as u128
     }
 
-    /// Along an axis (0 or 1): where what both have begins in this window and in the other one, and how many pixels it has.
+    /// The starts of the overlap in this window and the other along an axis, and its length.
     fn overlap(self, other: Self, axis: usize) -> (usize, usize, usize) {
         let of = |w: Self| match axis {
             0 => (i64::from(w.position.0), w.size.0 as i64),
@@ -410,7 +402,7 @@ impl Window {
     }
 }
 
-/// Refuses sizes that no image of this program has, windows that do not meet, and channels of another resolution.
+/// Refuses sizes of no image of this program, windows that do not meet, and subsampled channels.
 ///
 /// # Errors
 /// What is wrong, as the end of a sentence.
@@ -482,7 +474,7 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
         return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));
     }
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    // a panic in one of the decoder's threads would end the process: what decoders of these methods do to damaged blocks is not checked
+    // a panic in one of the decoder's threads ends the process, and damaged blocks are not checked
     let is_simple = |h: &Header| {
         matches!(h.compression, Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16)
     };
@@ -600,7 +592,7 @@ mod tests {
         }
     }
 
-    /// Blocks of cosine transforms say how many values they have, of which the decoder takes memory for all.
+    /// Blocks of cosine transforms say how many values the decoder takes memory for.
     #[test]
     fn blocks_have_as_many_values_as_their_pixels() {
         use exr::prelude::{Blocks, Encoding, Layer, LineOrder, SpecificChannels, WritableImage};

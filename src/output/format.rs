@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// A kind of image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {
     /// OpenEXR: every channel, metadata.
@@ -22,7 +21,7 @@ impl ImageFormat {
     ///
     /// # Errors
     /// [`Error::Usage`] for an extension of another kind.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub fn from_path(path: &Path) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("exr") => Ok(Self::Exr),

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A path whose file name contains a placeholder for the frame number: a run of `#`, one per digit at least. In folder names
-/// `#` has no meaning.
+/// A path with a placeholder for the frame number in its file name: one `#` per digit at least.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePattern {
     path: PathBuf,
@@ -19,7 +18,7 @@ impl FramePattern {
     ///
     /// # Errors
     /// [`Error::Usage`] for more than one run of `#`, or one in a name that is no Unicode.
-    pub fn of(path: &Path) -> Result<Option<Self>> {
+    pub fn from_path(path: &Path) -> Result<Option<Self>> {
         let wrong = |what: &str| Err(Error::Usage(format!("{}: {what}", path.display())));
         let Some(name) = path.file_name() else { return Ok(None) };
         let Some(start) = name.as_encoded_bytes().iter().position(|b| *b == b'#') else { return Ok(None) };
@@ -35,18 +34,18 @@ impl FramePattern {
         Ok(Some(Self { path: path.to_owned(), before: before.to_owned(), digits, after: after.to_owned() }))
     }
 
-    /// The path of a frame: its number with leading zeros, and more digits than there are `#` where it needs them.
+    /// The path of a frame: its number with leading zeros, and more digits where it needs them.
     pub fn path(&self, frame: u64) -> PathBuf {
         self.path.with_file_name(format!("{}{frame:0width$}{}", self.before, self.after, width = self.digits))
     }
 }
 
-/// Does a path contain a frame number placeholder? Errors are those of [`FramePattern::of`].
+/// Does a path contain a frame number placeholder? Errors are those of [`FramePattern::from_path`].
 pub fn is_pattern(path: &Path) -> Result<bool> {
-    Ok(FramePattern::of(path)?.is_some())
+    Ok(FramePattern::from_path(path)?.is_some())
 }
 
-/// The path of a frame; of a path without a pattern, the path itself. Errors are those of [`FramePattern::of`].
+/// The path of a frame, or the path itself. Errors are those of [`FramePattern::from_path`].
 pub fn numbered(path: &Path, frame: u64) -> Result<PathBuf> {
-    Ok(FramePattern::of(path)?.map_or_else(|| path.to_owned(), |p| p.path(frame)))
+    Ok(FramePattern::from_path(path)?.map_or_else(|| path.to_owned(), |p| p.path(frame)))
 }

@@ -12,7 +12,6 @@ pub enum Samples {
 }
 
 impl Samples {
-    /// Number of samples.
     pub fn len(&self) -> usize {
         match self {
             Samples::F32(s) => s.len(),
@@ -20,27 +19,22 @@ impl Samples {
         }
     }
 
-    /// Returns true if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// A named channel of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
     /// Name as EXR has it: `R`, `A`, `variance`, `depth.Z`, `position.X`, ...
     pub name: String,
-    /// Samples of all pixels.
     pub samples: Samples,
 }
 
 /// An image with named channels, linear values, and text metadata on how it was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
-    /// Width in pixels.
     pub width: u32,
-    /// Height in pixels.
     pub height: u32,
     /// Channels; the names are distinct.
     pub channels: Vec<Channel>,
@@ -57,12 +51,10 @@ impl Image {
         })
     }
 
-    /// `width * height`.
     pub fn pixel_count(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The value of a metadata entry.
     pub fn metadata(&self, key: &str) -> Option<&str> {
         self.metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str())
     }

@@ -1,4 +1,4 @@
-//! Image files: EXR with named float channels, pictures (PNG, JPEG, WebP, APNG), Radiance HDR, and frame numbers in file names.
+//! Image files: EXR, pictures (PNG, JPEG, WebP, APNG), Radiance HDR, and frame numbers in names.
 
 pub mod apng;
 pub mod decode;
@@ -26,14 +26,14 @@ pub use size::{MAX_PIXELS, check_size, parse_size};
 use crate::error::Result;
 use crate::memory::Budget;
 
-/// Writes an image, as the extension of the path says: `.exr` (everything), or a picture of the colour channels on black, 8-bit sRGB. On failure
-/// nothing is left behind, and a file that was there before is unchanged.
+/// Writes an image as the extension of the path says: `.exr` (everything), or a picture of the
+/// colour channels on black, 8-bit sRGB. On failure a file that was there before is unchanged.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown extension or an image that the format cannot have, [`Error::Output`].
+/// [`Error::Usage`] for an unknown extension or an image unfit for the format, [`Error::Output`].
 pub fn save(image: &Image, path: &Path) -> Result<()> {
     let settings = FileSettings::default();
-    match ImageFormat::of(path)? {
+    match ImageFormat::from_path(path)? {
         ImageFormat::Exr => exr::write(image, path),
         _ => Picture::new(image, None, &settings, path)?.save(path, settings.jpeg_quality()),
     }
@@ -52,7 +52,7 @@ pub fn load(path: &Path) -> Result<Image> {
 /// # Errors
 /// Those of [`load`], and [`Error::OutOfMemory`] for more than the budget has.
 pub fn load_within(path: &Path, budget: &Budget) -> Result<Image> {
-    match ImageFormat::of(path)? {
+    match ImageFormat::from_path(path)? {
         ImageFormat::Exr => exr::read_within(path, budget),
         _ => png::read(path, budget),
     }

@@ -13,7 +13,7 @@ pub const HEAT: [[u8; 3]; 9] = [
     [252, 253, 191],
 ];
 
-/// Colours of signed numbers from -1 (blue) over 0 (almost white) to 1 (red), evenly spaced, 8-bit sRGB: ColorBrewer's RdBu, which the colour-blind can read.
+/// Colours of numbers from -1 (blue) to 1 (red): ColorBrewer's RdBu, for the colour-blind, too.
 pub const SIGNED: [[u8; 3]; 11] = [
     [5, 48, 97],
     [33, 102, 172],

@@ -1,6 +1,6 @@
 //! Pictures: PNG, JPEG and WebP files of the colour channels, with integers of 8 or 16 bits.
 //!
-//! Colours of an [`Image`] are associated with its alpha (premultiplied); those of pictures with alpha are not, as PNG and WebP have it.
+//! Colours of an [`Image`] are premultiplied with its alpha; those of PNG and WebP are not.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -17,19 +17,15 @@ use crate::colour::{srgb_byte, srgb_decode, srgb_encode};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
-/// Names of the channels that have colour.
 const COLOUR: [&str; 4] = ["R", "G", "B", "Y"];
 
 /// Integers of a picture, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Width in pixels.
     pub width: u32,
-    /// Height in pixels.
     pub height: u32,
     /// Channels of a pixel; alpha is not premultiplied.
     pub colour: Colour,
-    /// Bits per channel.
     pub bits: PngBits,
     /// Transfer function of the colours; alpha has none.
     pub encoding: PngEncoding,
@@ -37,7 +33,7 @@ pub struct Picture {
     pub bytes: Vec<u8>,
 }
 
-/// The colour channels of an image divided by its alpha, 0 where alpha is 0; other channels, alpha among them, stay. An image without alpha stays as it is.
+/// The colour channels of an image divided by its alpha, 0 where alpha is 0; others stay.
 pub fn unassociated(image: &Image) -> Image {
     let mut out = image.clone();
     let Some(alpha) = image.f32("A") else { return out };
@@ -55,8 +51,8 @@ fn clamped(value: f32) -> f32 {
 }
 
 impl Picture {
-    /// The colours of an image, which are not associated with its alpha, on a background or with alpha. Without a `background` alpha is ignored; an image
-    /// without a channel `A` is opaque. Colours are clamped to 0 to 1 first. `path` is what an error names.
+    /// A picture of an image's colours (not premultiplied, clamped to 0 to 1) on a background or
+    /// with alpha. Without a `background` alpha is ignored. `path` is what an error names.
     ///
     /// # Errors
     /// [`Error::Usage`] for an image without colour.
@@ -80,6 +76,8 @@ impl Picture {
             (_, 1) => Colour::Grey,
             _ => Colour::Rgb,
         };
+
+        // Composites and encodes the value of a channel of a pixel.
         let value = |c: usize, p: usize| -> f32 {
             let linear = || clamped(planes[c][p]);
             let coded = |v: f32| if encoding == PngEncoding::Srgb { srgb_encode(v) } else { v };
@@ -92,6 +90,8 @@ impl Picture {
                 Some(Background::Transparent) | None => coded(linear()),
             }
         };
+
+        // Quantizes.
         let (channels, size) = (colour.channels(), bits.bytes());
         let mut bytes = vec![0; image.pixel_count() * channels * size];
         bytes.par_chunks_mut(channels * size).enumerate().with_min_len(1024).for_each(|(p, pixel)| {
@@ -117,7 +117,8 @@ impl Picture {
         Ok(Self { width, height, colour, bits: PngBits::Eight, encoding: PngEncoding::Srgb, bytes })
     }
 
-    /// This opaque picture of 8-bit sRGB, which shows a scene on black, on a background. `coverage`: the share of each pixel that shows the scene, 0 to 1.
+    /// This opaque picture of a scene on black, on a background, by the scene's `coverage` of
+    /// pixels.
     ///
     /// # Errors
     /// [`Error::Usage`] for coverage of another number of pixels.
@@ -126,6 +127,8 @@ impl Picture {
         if coverage.len() != pixels || self.bits != PngBits::Eight || self.encoding != PngEncoding::Srgb {
             return Err(Error::Usage(format!("coverage of {} pixels for a picture of {pixels}", coverage.len())));
         }
+
+        // Chooses the channels that the background needs.
         let own = self.colour.channels();
         let behind = match background {
             Background::Transparent => [0.0; 3],
@@ -139,6 +142,8 @@ impl Picture {
             (false, true) => Colour::Rgba,
             (false, false) => Colour::Rgb,
         };
+
+        // Composites in linear light, pixel by pixel.
         let mut bytes = Vec::with_capacity(pixels * colour.channels());
         for (pixel, &covered) in self.bytes.chunks_exact(own).zip(coverage) {
             let covered = clamped(covered);
@@ -163,12 +168,12 @@ impl Picture {
         Ok(Self { colour, bytes, ..self })
     }
 
-    /// Writes the file, in the format of its extension. JPEG and WebP have 8-bit sRGB; JPEG has no alpha.
+    /// Writes the file in the format of its extension. JPEG and WebP have 8-bit sRGB.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a format that is no picture or cannot have these values; [`Error::Output`].
+    /// [`Error::Usage`] for a format that is unfit for these values; [`Error::Output`].
     pub fn save(&self, path: &Path, jpeg_quality: u8) -> Result<()> {
-        let format = ImageFormat::of(path)?;
+        let format = ImageFormat::from_path(path)?;
         let wrong = |what: &str| Err(Error::Usage(format!("{}: {what}", path.display())));
         if format == ImageFormat::Png {
             return self.save_png(path);
@@ -176,6 +181,8 @@ impl Picture {
         if self.bits != PngBits::Eight || self.encoding != PngEncoding::Srgb {
             return wrong("this format has 8-bit sRGB only; write a .png");
         }
+
+        // Refuses what the format cannot have.
         let colour = match self.colour {
             Colour::Grey => ExtendedColorType::L8,
             Colour::GreyAlpha => ExtendedColorType::La8,
@@ -195,6 +202,8 @@ impl Picture {
         }
         write_atomically(path, |file| {
             let mut out = BufWriter::with_capacity(1 << 16, file);
+
+            // Encodes, and passes errors of the file on as they are.
             let written = match format {
                 ImageFormat::Jpeg => JpegEncoder::new_with_quality(&mut out, jpeg_quality).write_image(
                     &self.bytes,
@@ -236,7 +245,6 @@ impl Picture {
 const WEBP_SIDE: u32 = 16384;
 
 impl PngBits {
-    /// Bytes per channel.
     pub fn bytes(self) -> usize {
         match self {
             Self::Eight => 1,

@@ -1,8 +1,7 @@
-//! PNG: 8-bit sRGB of images and bytes, and what PNG, JPEG and WebP files have in common when they are read. [`super::picture`] has other bits, encodings and
-//! alpha.
+//! PNG: 8-bit sRGB of images and bytes, and reading of PNG, JPEG and WebP. [`super::picture`] has
+//! other bits, encodings and alpha.
 //!
-//! Channels `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one. Other channels (alpha, depth, ids)
-//! and the metadata are left out: EXR keeps them.
+//! Channels `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one.
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -24,18 +23,13 @@ pub const ENCODING: &str = "encoding";
 /// Colour type of pixels. Alpha is not premultiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
-    /// One value a pixel.
     Grey,
-    /// Grey and alpha.
     GreyAlpha,
-    /// Red, green and blue.
     Rgb,
-    /// Red, green, blue and alpha.
     Rgba,
 }
 
 impl Colour {
-    /// Values a pixel.
     pub fn channels(self) -> usize {
         match self {
             Self::Grey => 1,
@@ -53,7 +47,6 @@ impl Colour {
         }
     }
 
-    /// Is alpha among the values?
     pub fn has_alpha(self) -> bool {
         matches!(self, Self::GreyAlpha | Self::Rgba)
     }
@@ -72,7 +65,7 @@ impl Colour {
 /// Primaries and white of sRGB, times 100000: white, red, green, blue.
 const CHROMATICITIES: [(u32, u32); 4] = [(31270, 32900), (64000, 33000), (30000, 60000), (15000, 6000)];
 
-/// Names the transfer function and the primaries: chunks sRGB, gAMA and cHRM, without sRGB for linear values.
+/// Names transfer function and primaries: chunks sRGB, gAMA and cHRM, linear values without sRGB.
 pub(super) fn set_encoding<W: Write>(encoder: &mut ::png::Encoder<W>, encoding: PngEncoding) {
     let [white, red, green, blue] =
         CHROMATICITIES.map(|(x, y)| (::png::ScaledFloat::from_scaled(x), ::png::ScaledFloat::from_scaled(y)));
@@ -94,8 +87,7 @@ pub(super) fn no_colour(path: &Path) -> Error {
     ))
 }
 
-/// The colour channels of an image as 8-bit sRGB, brightened by `exposure` stops (0 = as they are, 1 = twice as bright).
-/// `path` is what an error names.
+/// The colour channels as 8-bit sRGB, brightened by `exposure` stops. Errors name `path`.
 pub fn bytes_of(image: &Image, exposure: f32, path: &Path) -> Result<(Vec<u8>, Colour)> {
     image.check()?;
     check_size(image.width, image.height)?;
@@ -121,11 +113,6 @@ pub fn write(image: &Image, path: &Path, exposure: f32) -> Result<()> {
     write_bytes(path, bytes, image.width, image.height, colour)
 }
 
-/// Writes 8-bit grey values as they are, `width * height` of them.
-pub fn write_grey(path: &Path, grey: &[u8], width: u32, height: u32) -> Result<()> {
-    write_bytes(path, grey.to_vec(), width, height, Colour::Grey)
-}
-
 /// Writes 8-bit sRGB values as they are, three for each of `width * height` pixels.
 pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
     write_bytes(path, rgb.to_vec(), width, height, Colour::Rgb)
@@ -135,9 +122,8 @@ fn write_bytes(path: &Path, bytes: Vec<u8>, width: u32, height: u32, colour: Col
     Picture::of_bytes(bytes, [width, height], colour)?.save_png(path)
 }
 
-/// The 1-ray depth image: distances along the view to grey from 0 to 1, nearest = white, farthest = black, linear in between over
-/// the range that occurs. Background (a distance that is not finite, or not above 0) is black. A single distance
-/// everywhere is white. No transfer function: the grey is a number to read off, not light.
+/// The 1-ray depth image: distances as linear grey from white (nearest) to black (farthest and
+/// background); a single distance is white. There is no transfer function: grey is a number here.
 pub fn depth_to_unit(depth: &[f32]) -> Vec<f32> {
     let seen = |d: &f32| d.is_finite() && *d > 0.0;
     let (near, far) = depth
@@ -151,19 +137,20 @@ pub fn depth_to_unit(depth: &[f32]) -> Vec<f32> {
     depth.par_iter().map(|d| if seen(d) { grey(*d) } else { 0.0 }).collect()
 }
 
-/// Does the header of a PNG name no transfer function but 1? The crate image does not tell. False for other bytes.
+/// Does the header of a PNG name no transfer function but 1? False for other bytes.
 pub fn is_linear(bytes: &[u8]) -> bool {
     let reader = ::png::Decoder::new(Cursor::new(bytes)).read_info();
     reader.is_ok_and(|r| r.info().gamma().is_some_and(|gamma| gamma.into_scaled().abs_diff(100_000) < 100))
 }
 
-/// Reads a PNG, JPEG or WebP file as linear light: channels `R`, `G`, `B` of a colour image, `Y` of a grey one. Values have the transfer function of sRGB, but those of a PNG that
-/// says that it is linear (gAMA 1). Alpha becomes the channel `A`, and the colours are associated with it, as those of EXR files are.
+/// Reads a PNG, JPEG or WebP file as linear light: `R`, `G`, `B` of a colour image, `Y` of a grey
+/// one. Values have sRGB's transfer function, but those of a PNG of gAMA 1. Alpha becomes `A`, and
+/// colours are premultiplied with it, as in EXR files.
 ///
 /// # Errors
-/// [`Error::Input`], [`Error::Usage`] for the name of another kind of file, and [`Error::OutOfMemory`] for more than the budget has.
+/// [`Error::Input`], [`Error::Usage`] for the name of another kind of file, [`Error::OutOfMemory`].
 pub fn read(path: &Path, budget: &Budget) -> Result<Image> {
-    let (name, format) = match ImageFormat::of(path)? {
+    let (name, format) = match ImageFormat::from_path(path)? {
         ImageFormat::Png => ("PNG", image::ImageFormat::Png),
         ImageFormat::Jpeg => ("JPEG", image::ImageFormat::Jpeg),
         ImageFormat::WebP => ("WebP", image::ImageFormat::WebP),
@@ -180,12 +167,16 @@ pub fn read(path: &Path, budget: &Budget) -> Result<Image> {
     let decoded = decode(&bytes, format, max);
     budget.check().map_err(|e| e.of(path))?;
     let decoded = decoded.map_err(|e| Error::input(path, format!("not a readable {name}: {e}")))?;
+
+    // What the file says of its values.
     let is_linear = format == image::ImageFormat::Png && is_linear(&bytes);
     let (width, height) = (decoded.width(), decoded.height());
     check_size(width, height).map_err(|e| Error::input(path, e.to_string()))?;
     let bits = 8 * usize::from(decoded.color().bytes_per_pixel()) / usize::from(decoded.color().channel_count());
     let encoding = if is_linear { "linear" } else { "sRGB" };
     let metadata = vec![(ENCODING.to_owned(), format!("{bits}-bit {encoding}"))];
+
+    // Decodes the colours, and premultiplies them with alpha.
     let linear = |coded: f32| if is_linear { coded } else { srgb_decode(coded) };
     let alpha: Option<Vec<f32>> = decoded.color().has_alpha().then(|| decoded.to_rgba32f().pixels().map(|p| p.0[3]).collect());
     let channel = |name: &str, mut samples: Vec<f32>| {

@@ -10,10 +10,9 @@ use crate::files::{self, write_atomically};
 
 /// Prefix of the keywords.
 const PREFIX: &str = "skylit.";
-/// Longest keyword of the format, bytes.
 const MAX_KEYWORD: usize = 79;
 
-/// Writes the colour channels of an image as 8-bit sRGB, and its metadata. The same image gives the same bytes.
+/// Writes the colour channels as 8-bit sRGB, and metadata. The same image gives the same bytes.
 ///
 /// # Errors
 /// [`Error::Usage`] for an image without colour or a key that is too long, [`Error::Output`].
@@ -39,9 +38,6 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
 }
 
 /// Reads the metadata of a PNG, sorted by key; empty for one of another program.
-///
-/// # Errors
-/// [`Error::Input`].
 pub fn read_metadata(path: &Path) -> Result<Vec<(String, String)>> {
     files::read_start(path)?;
     let file = files::open_regular(path).map_err(|e| Error::read(path, &e))?;

@@ -1,6 +1,7 @@
-//! Radiance HDR (`.hdr`, `.pic`): the header is read here, the pixels by the crate image, which knows one signature and one orientation and does not apply exposures.
+//! Radiance HDR (`.hdr`, `.pic`): the header is read here, the pixels by the crate image, which
+//! knows neither all signatures and orientations nor exposures.
 //!
-//! Values are divided by all `EXPOSURE` and `COLORCORR` entries, as the format says, so that they are what was recorded.
+//! Values are divided by all `EXPOSURE` and `COLORCORR` entries: so they are as recorded.
 
 use std::io::ErrorKind;
 
@@ -16,20 +17,16 @@ const MAX_HEADER: usize = 1 << 16;
 /// A decoded file: linear values, rows from the top, pixels from the left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadianceImage {
-    /// Width in pixels.
     pub width: u32,
-    /// Height in pixels.
     pub height: u32,
-    /// Red, green and blue.
     pub rgb: Vec<[f32; 3]>,
 }
 
-/// Whether a file begins as those of Radiance do: `#?RADIANCE`, `#?RGBE`, or another program's name.
+/// Does a file begin as those of Radiance: `#?RADIANCE`, `#?RGBE`, or another program's name?
 pub fn is_radiance(bytes: &[u8]) -> bool {
     bytes.starts_with(b"#?")
 }
 
-/// What the header says.
 #[derive(Clone, Debug, PartialEq)]
 struct Header {
     /// Where the pixels begin.
@@ -95,13 +92,18 @@ impl Header {
         let mut next_line = || -> Result<String, String> {
             let rest = &bytes[length..];
             let end = rest.iter().take(MAX_HEADER).position(|b| *b == b'\n');
-            let end = end.filter(|end| length + end < MAX_HEADER).ok_or_else(|| match bytes.len() < MAX_HEADER {
-                true => ENDS_EARLY.to_owned(),
-                false => "is no Radiance HDR: its header has no end".to_owned(),
+            let end = end.filter(|end| length + end < MAX_HEADER).ok_or_else(|| {
+                if bytes.len() < MAX_HEADER {
+                    ENDS_EARLY.to_owned()
+                } else {
+                    "is no Radiance HDR: its header has no end".to_owned()
+                }
             })?;
             length += end + 1;
             Ok(String::from_utf8_lossy(&rest[..end]).trim().to_owned())
         };
+
+        // Multiplies the exposures of all lines up to an empty one.
         loop {
             let line = next_line()?;
             if line.is_empty() {
@@ -147,7 +149,7 @@ fn shortened(line: &str) -> String {
 }
 
 impl Resolution {
-    /// Parses a line such as `-Y 512 +X 1024`: of the axis along which scan lines follow one another, then of the axis along them.
+    /// Parses a line such as `-Y 512 +X 1024`: the axis across scan lines, and the one along them.
     fn parse(line: &str) -> Result<Self, String> {
         let wrong = || format!("has {:?} in its header where its size should be, like -Y 512 +X 1024", shortened(line));
         let words: Vec<&str> = line.split_whitespace().collect();

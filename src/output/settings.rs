@@ -50,7 +50,7 @@ choices! {
     }
 }
 
-/// What is behind the scene in a picture.
+/// The background of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
     /// Nothing: the file keeps alpha.
@@ -133,14 +133,16 @@ impl FileSettings {
         self.png_bits.unwrap_or_default() != PngBits::Eight || self.png_encoding.unwrap_or_default() != PngEncoding::Srgb
     }
 
-    /// Checks that each setting has an effect on one of these files, and that the files can have it. `depth_image`: the file of a depth image besides.
+    /// Checks that each setting has an effect on one of these files and fits them all.
+    /// `depth_image`: the file of a depth image besides.
     ///
     /// # Errors
     /// [`Error::Usage`], naming the option and what to do about it.
     pub fn check(&self, outputs: &[PathBuf], depth_image: Option<&Path>) -> Result<()> {
-        let is = |path: &Path, format: ImageFormat| ImageFormat::of(path).is_ok_and(|f| f == format);
+        let is = |path: &Path, format: ImageFormat| ImageFormat::from_path(path).is_ok_and(|f| f == format);
         let has = |format: ImageFormat| outputs.iter().any(|p| is(p, format));
-        let has_picture = outputs.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(ImageFormat::is_picture));
+        let has_picture =
+            outputs.iter().any(|p| apng::is_apng(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
         let has_png = has(ImageFormat::Png);
         let has_deep_depth = depth_image.is_some_and(|p| is(p, ImageFormat::Png));
         let given = [

@@ -3,8 +3,7 @@
 use crate::error::{Error, Result};
 use crate::settings::parse::Parsed;
 
-/// Maximum number of pixels of an image: 16384 x 16384. More would overflow the 32-bit indices of
-/// the tracers.
+/// Maximum number of pixels of an image: more overflow the 32-bit indices of the tracers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Parses an image size `WxH` in pixels.

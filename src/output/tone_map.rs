@@ -1,4 +1,4 @@
-//! Tone mapping from radiance to display range. Applied only when an 8-bit image is written: images are kept linear.
+//! Tone mapping from radiance to display range, for 8-bit images only: images are kept linear.
 
 use rayon::prelude::*;
 
@@ -24,7 +24,8 @@ impl ToneMap {
         }
     }
 
-    /// The channels `R`, `G`, `B` of an image, brightened by `exposure` stops and mapped; other channels are dropped, and all channels if one of these is missing.
+    /// The channels `R`, `G`, `B`, brightened by `exposure` stops and mapped; none if any is
+    /// missing.
     pub fn apply(self, image: &Image, exposure: f32) -> Image {
         let gain = exposure.exp2();
         let mut out = Image { width: image.width, height: image.height, ..Default::default() };
@@ -54,7 +55,6 @@ fn neutral(c: Rgb) -> Rgb {
     c.map(|x| x * new_peak / peak * (1.0 - grey) + new_peak * grey)
 }
 
-/// Rows.
 type Matrix = [Rgb; 3];
 const INSET: Matrix = [
     [0.842_479, 0.078_433_6, 0.079_223_75],

@@ -91,7 +91,7 @@ impl IntermediateImage<'_> {
 }
 
 fn save(image: &Image, integrator: &dyn Integrator, options: &PictureOptions, files: &FileSettings, path: &Path) -> Result<()> {
-    let format = ImageFormat::of(path)?;
+    let format = ImageFormat::from_path(path)?;
     if format == ImageFormat::Exr {
         return output::exr::write_with(image, path, &files.into());
     }

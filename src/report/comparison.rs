@@ -1,4 +1,4 @@
-//! Sections about images that were compared: the images, their metrics, a histogram of their differences, and where they differ most.
+//! Sections about compared images: the images, metrics, a histogram of differences, worst regions.
 
 use super::{
     Axis, Cell, Chart, Column, ComparedImage, ImageComparison, Mark, Part, Point, Row, Scale, Section, Series, Table,
@@ -18,24 +18,21 @@ const WORST: usize = 8;
 /// An image, as a section names it.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedImage<'a> {
-    /// Its name, short.
+    /// A short name.
     pub name: &'a str,
     /// More about it, a line; may be empty.
     pub description: &'a str,
-    /// The image.
     pub image: &'a Image,
     /// How it differs from the reference; `None` for the reference itself.
     pub comparison: Option<&'a Comparison>,
 }
 
-/// A metric of a comparison.
 #[derive(Clone, Debug)]
 pub struct Metric {
-    /// Its name.
     pub name: &'static str,
-    /// What it is, its range and unit.
+    /// An explanation, with range and unit.
     pub help: &'static str,
-    /// Its value; `None` where it is not defined.
+    /// `None` where it is not defined.
     pub value: Option<f64>,
     /// The value as it is shown, with its unit; `-` for none.
     pub text: String,
@@ -56,6 +53,8 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
         value: value.map(|n| n as f64),
         text: value.map_or_else(|| "-".to_owned(), |n| n.to_string()),
     };
+
+    // The sign and the standard error of the bias belong to its value.
     let bias_text =
         format!("{}{} ± {}", if c.bias > 0.0 { "+" } else { "" }, format_number(c.bias), format_number(c.bias_standard_error));
     vec![
@@ -100,7 +99,7 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
     ]
 }
 
-/// A section that shows `images`, of which number `reference` is what the others were compared with, and everything that was measured.
+/// A section of `images` and all measurements; number `reference` is compared with the others.
 ///
 /// # Errors
 /// [`Error::Usage`] where the images do not fit together or nothing was compared.
@@ -143,7 +142,8 @@ pub fn image_comparison(images: &[NamedImage], reference: usize) -> Result<Image
     })
 }
 
-/// Values of the named channels, those of a pixel side by side. A grey image has the same value in all of them; a channel that it lacks otherwise is not a number.
+/// Values of the named channels, those of a pixel side by side. A grey image has the same value in
+/// all of them; a channel that it lacks otherwise is NaN.
 fn interleaved(image: &Image, channels: &[String]) -> Vec<f32> {
     let grey = ["Y", "R"].iter().find_map(|name| image.f32(name));
     let planes: Vec<_> = channels.iter().map(|name| image.f32(name).or(grey)).collect();
@@ -209,7 +209,6 @@ fn differences(c: &Comparison) -> Vec<f64> {
     counted.map(|(_, d)| f64::from(*d)).collect()
 }
 
-/// What is measured of a region.
 struct RegionErrors {
     rmse: f64,
     bias: f64,
@@ -267,7 +266,7 @@ pub fn region_table(images: &[NamedImage]) -> Table {
     table
 }
 
-/// The image in [`GRID`] x [`GRID`] parts that differ in size by a pixel at most; fewer of images with fewer pixels.
+/// The image in [`GRID`] x [`GRID`] parts of about one size; fewer of images with fewer pixels.
 fn regions([width, height]: [u32; 2]) -> Vec<[u32; 4]> {
     let parts = |size: u32| {
         let count = GRID.min(size);

@@ -11,15 +11,13 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// Two or more images of one size. A reader looks at them side by side, with a slider between two, or in turn, at their differences and their FLIP maps; reads
-/// the values under the pointer; zooms, moves and brightens all of them at once.
+/// Two or more images of one size. A reader looks at them side by side, with a slider, or in turn,
+/// at their differences and FLIP maps; reads values; zooms, moves and brightens all at once.
 #[derive(Clone, Debug, Default)]
 pub struct ImageComparison {
-    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Names of the channels of every image. Three are shown as red, green and blue; of others the first is shown as grey.
+    /// Channel names of every image. Three are red, green and blue; else the first is grey.
     pub channels: Vec<String>,
-    /// The images.
     pub images: Vec<ComparedImage>,
     /// Index of the image that the others are compared with.
     pub reference: usize,
@@ -27,20 +25,19 @@ pub struct ImageComparison {
     pub mask: Option<Vec<bool>>,
 }
 
-/// An image of an [`ImageComparison`].
 #[derive(Clone, Debug, Default)]
 pub struct ComparedImage {
-    /// Its name, short: a file's name, or an integrator's.
+    /// A short name: a file's, or an integrator's.
     pub name: String,
     /// More about it, a line; may be empty.
     pub description: String,
-    /// Linear values, the channels of a pixel side by side, rows from the top. They are shown as they are: any exposure is the reader's.
+    /// Linear values, channels of a pixel side by side, rows from the top. The reader exposes them.
     pub values: Vec<f32>,
     /// FLIP of each pixel against the reference, 0 to 1, if it was computed.
     pub flip: Option<Vec<f32>>,
 }
 
-/// What the page itself says of an [`ImageComparison`]; pixels are in a file of their own.
+/// The part of an [`ImageComparison`] in the page itself; pixels are in a file of their own.
 #[derive(Clone, Debug, Serialize)]
 pub struct ImagesContext {
     /// Tells it apart on the page.
@@ -76,7 +73,7 @@ struct ImageData {
 }
 
 impl ImageComparison {
-    /// Do sizes and numbers agree? A page with images that do not fit together would show the wrong values.
+    /// Do sizes and numbers agree? Otherwise a page would show the wrong values.
     fn check(&self) -> Result<()> {
         let wrong = |what: String| Err(Error::Usage(format!("the report cannot show images: {what}")));
         let pixels = self.size[0] as usize * self.size[1] as usize;
@@ -98,7 +95,7 @@ impl ImageComparison {
         Ok(())
     }
 
-    /// What the page says of the images, as number `index` of the page.
+    /// The part of the page about the images, as number `index` of it.
     ///
     /// # Errors
     /// [`Error::Usage`] for images that differ in size.
@@ -142,8 +139,8 @@ impl ImagesContext {
     }
 }
 
-/// Interleaved floats, all bits of them: channel after channel, and of each the least significant bytes of all values before the next ones, which compresses
-/// to less than values as they lie in memory.
+/// Interleaved floats without loss: channel after channel, and of each the least significant bytes
+/// of all values before the next ones, which compresses better than values as they lie in memory.
 fn encode(values: &[f32], channels: usize) -> Result<String> {
     let planar: Vec<[u8; 4]> =
         (0..channels).flat_map(|c| values.iter().skip(c).step_by(channels)).map(|v| v.to_le_bytes()).collect();

@@ -1,15 +1,10 @@
-//! Labels beside points, where they cover neither each other nor anything else, as far as there is room.
+//! Labels beside points, which cover neither each other nor anything else, where there is room.
 
-/// A rectangle in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
-    /// Left.
     pub x: f64,
-    /// Top.
     pub y: f64,
-    /// Width.
     pub width: f64,
-    /// Height.
     pub height: f64,
 }
 
@@ -46,14 +41,13 @@ pub const LINE_FROM: f64 = 20.0;
 /// Where a label goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedLabel {
-    /// What it covers.
     pub rect: Rect,
     /// Distance from its point in pixels.
     pub distance: f64,
 }
 
-/// Places labels of these sizes beside their points, in order, within `frame`. `obstacles` are not to be covered. A label that has room nowhere covers as
-/// little as it can.
+/// Places labels of these sizes beside their points, in order, within `frame` and outside of
+/// `obstacles`. A label that has room nowhere covers as little as it can.
 pub fn place(labels: &[([f64; 2], [f64; 2])], frame: Rect, obstacles: &[Rect]) -> Vec<PlacedLabel> {
     let mut taken = obstacles.to_vec();
     let mut placed = Vec::with_capacity(labels.len());

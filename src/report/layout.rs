@@ -10,17 +10,16 @@ use super::table::format_number;
 const SIZE: [f64; 2] = [720.0, 400.0];
 /// Left, top, right and bottom of the area of the points.
 const AREA: [f64; 4] = [96.0, 12.0, 704.0, 346.0];
-/// Width of a letter and height of a line of the names of points, which are larger on phones: a little too much room is no harm.
+/// Width of a letter of a point's name, and height of its line, with room for those of phones.
 const NAME_WIDTH: f64 = 8.6;
 const NAME_HEIGHT: f64 = 15.0;
-/// Magnitude of what axes hold at most, and its inverse, below which numbers are 0: beyond it, quotients of an axis' ends would be no numbers any more.
+/// Maximum magnitude on axes, and its inverse, below which numbers are 0: quotients stay numbers.
 const MAX_MAGNITUDE: f64 = 1e100;
 /// Logarithmic axes of less than this ratio have numbers at even distances.
 const MIN_DECADE: f64 = 6.0;
 /// Different colours of series; more than these repeat.
 pub const COLORS: usize = 8;
 
-/// A chart in pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChartLayout {
     pub(super) title: String,
@@ -41,7 +40,6 @@ struct Tick {
     text: String,
 }
 
-/// A series in pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct SeriesLayout {
     pub(super) name: String,
@@ -49,7 +47,7 @@ pub struct SeriesLayout {
     /// Drawn in grey.
     pub(super) is_neutral: bool,
     pub(super) is_dashed: bool,
-    /// The legend names it: its points have no names of their own, and no series before it has its name.
+    /// The legend names it: its points have no names of their own, and it is the first of its name.
     pub(super) is_in_legend: bool,
     /// Points of the line that joins the points, as SVG has them; empty for none.
     line: String,
@@ -108,7 +106,7 @@ impl Span {
         (at * 100.0).round() / 100.0
     }
 
-    /// Position of a value, moved to the end of the axis that it lies beyond; `None` for one without a place.
+    /// Position of a value, clamped to the axis; `None` for one without a place.
     fn place(&self, value: f64) -> Option<f64> {
         let has_place = value.is_finite() && (self.scale == Scale::Linear || value > 0.0);
         has_place.then(|| self.position(value.clamp(self.range[0], self.range[1])))
@@ -206,12 +204,13 @@ impl ChartLayout {
 }
 
 fn series_layout(series: &Series, chart: &Chart, [x, y]: [&Span; 2], color: usize) -> SeriesLayout {
-    let label = |p: &Point| match p.label.is_empty() {
-        true => {
+    let label = |p: &Point| {
+        if p.label.is_empty() {
             let numbers = [(&chart.x, p.x), (&chart.y, p.y)].map(|(axis, v)| format!("{} {}", axis.label, format_number(v)));
             format!("{}: {}", series.name, numbers.join(", "))
+        } else {
+            p.label.clone()
         }
-        false => p.label.clone(),
     };
     let bar = |bar: &Option<[f64; 2]>, span: &Span| bar.and_then(|[a, b]| Some([span.place(a)?, span.place(b)?]));
     let points: Vec<PointLayout> = series
@@ -234,6 +233,8 @@ fn series_layout(series: &Series, chart: &Chart, [x, y]: [&Span; 2], color: usiz
             })
         })
         .collect();
+
+    // Joins the points that count to a line.
     let joined: Vec<[f64; 2]> = points.iter().filter(|p| !p.is_muted).map(|p| [p.x, p.y]).collect();
     let corners = match series.mark {
         Mark::Points => Vec::new(),
@@ -252,7 +253,7 @@ fn series_layout(series: &Series, chart: &Chart, [x, y]: [&Span; 2], color: usiz
     }
 }
 
-/// Finds room for the names of points, where they cover neither points, bars and lines nor each other.
+/// Finds room for the names of points, which cover no points, bars, lines and names.
 fn place_names(series: &mut [SeriesLayout]) {
     let mut obstacles = Vec::new();
     for s in series.iter() {

@@ -1,7 +1,7 @@
 //! HTML reports: a page of sections, which hold text, tables, charts and images to compare.
 //!
-//! [`write()`] makes a folder of it that needs no network and no server: `index.html`, with styles and scripts inside, and the pixels of images in
-//! `data/*.js`, which the page loads when they come into view. It is opened from disk.
+//! [`write()`] makes a folder that is opened from disk, without network and server: `index.html`,
+//! with styles and scripts inside, and pixels in `data/*.js`, which the page loads on demand.
 //!
 //! ```no_run
 //! use skylit::report::{self, Page, Part, Row, Section, Table};
@@ -33,31 +33,26 @@ pub use page::{address, write};
 pub use svg::{check_svg_name, write_svg};
 pub use table::{Cell, Column, Row, Status, Table, format_number, thousands};
 
-/// A page of a report.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
-    /// Its title.
     pub title: String,
-    /// What the page says, in a sentence or two; shown under the title.
+    /// A sentence or two under the title.
     pub summary: String,
     /// The command that made it, as it was typed; may be empty.
     pub command: String,
     /// Facts about all of it, name and value: device, driver, version.
     pub facts: Vec<(String, String)>,
-    /// What must not be overlooked, a sentence each.
+    /// A sentence for each thing that must not be overlooked.
     pub warnings: Vec<String>,
-    /// Its sections, in order. The page begins with a list of them where there are more than two.
+    /// The sections, listed at the page's start where there are more than two.
     pub sections: Vec<Section>,
 }
 
-/// A section of a page.
 #[derive(Clone, Debug, Default)]
 pub struct Section {
-    /// Its title.
     pub title: String,
     /// The outcome of a check that the section is about, shown beside the title.
     pub status: Option<Status>,
-    /// What it holds, in order.
     pub parts: Vec<Part>,
     /// Shows only the title until the reader opens it.
     pub folded: bool,
@@ -70,14 +65,10 @@ impl Section {
     }
 }
 
-/// A part of a section.
 #[derive(Clone, Debug)]
 pub enum Part {
-    /// A paragraph of plain text.
     Text(String),
-    /// A table.
     Table(Table),
-    /// A chart.
     Chart(Chart),
     /// Images side by side, with their differences.
     Images(ImageComparison),

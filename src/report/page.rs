@@ -58,8 +58,7 @@ enum PartContext {
     Images { images: ImagesContext },
 }
 
-/// Writes a page into the folder `dir`, which is made where it is missing, and returns the path of its `index.html`. A report that was there before is
-/// replaced.
+/// Writes a page into the folder `dir`, in place of a former one, and returns the path of its file.
 ///
 /// # Errors
 /// [`Error::Output`]; [`Error::Usage`] for images that do not fit together.
@@ -67,6 +66,8 @@ pub fn write(dir: &Path, page: &Page) -> Result<PathBuf> {
     let environment = templates()?;
     let data = dir.join("data");
     fs::create_dir_all(&data).map_err(|e| Error::write(&data, &e))?;
+
+    // Lays out the sections, and writes pixels into files beside the page.
     let mut colors = HashMap::new();
     let mut images = 0;
     let mut sections = Vec::new();
@@ -103,6 +104,8 @@ pub fn write(dir: &Path, page: &Page) -> Result<PathBuf> {
         sections.push(SectionContext { title: section.title.clone(), status: section.status, folded: section.folded, parts });
     }
     remove_data_after(&data, images);
+
+    // Renders the page, with everything but pixels inside.
     let text = environment.get_template("page.html").and_then(|t| {
         t.render(context! {
             title => page.title,
@@ -150,7 +153,7 @@ pub fn address(path: &Path) -> String {
     address
 }
 
-/// Removes pixels of a report that had more images. Their page is replaced, so nobody reads them; that one cannot be removed is no failure.
+/// Removes pixels of a former report with more images, which nobody reads; failing is harmless.
 fn remove_data_after(data: &Path, images: usize) {
     for k in images + 1.. {
         if fs::remove_file(data.join(format!("images-{k}.js"))).is_err() {
@@ -165,7 +168,7 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// Templates are part of the program: one that does not work is a bug, and tests render all of them.
+/// A template that does not work is a bug of the program, and tests render all of them.
 pub(super) fn broken(error: minijinja::Error) -> Error {
     Error::CheckFailed(format!("a template of the report is broken: {error:#}"))
 }
@@ -218,7 +221,7 @@ mod tests {
         assert!(data.contains("images-1") && data.contains("\"values\""), "{data}");
     }
 
-    /// What scripts look for is in the templates; a browser tests the rest (scripts/report.sh).
+    /// Templates have the elements that scripts look for; a browser tests the rest.
     #[test]
     fn scripts_know_the_templates() {
         let names = |text: &str| -> Vec<String> {

@@ -1,17 +1,17 @@
-//! Which points of a chart are worth their place: no other is less along one axis and no greater along the other.
+//! Points of a chart that no other dominates: less along one axis, no greater along the other.
 
 use super::chart::{Mark, Point, Series};
 
 /// Beyond the ends of every axis: points there are drawn at the end.
 pub const BEYOND: f64 = 1e200;
 
-/// For each point, whether another one dominates it: is less along one axis and no greater along the other. Points that are equal do not dominate each other.
+/// For each point, whether another is less along one axis and no greater along the other.
 pub fn dominated(points: &[[f64; 2]]) -> Vec<bool> {
     let dominates = |a: &[f64; 2], b: &[f64; 2]| a[0] <= b[0] && a[1] <= b[1] && a != b;
     points.iter().map(|p| points.iter().any(|q| dominates(q, p))).collect()
 }
 
-/// The border of what points dominate, in steps from the upper end of the chart to its right end; `None` without points.
+/// The border of what points dominate, in steps from the chart's upper end to its right end.
 pub fn front(points: &[Point]) -> Option<Series> {
     let places: Vec<[f64; 2]> = points.iter().map(|p| [p.x, p.y]).collect();
     let best = places.iter().zip(dominated(&places)).filter(|(_, is_dominated)| !is_dominated);

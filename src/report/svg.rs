@@ -39,9 +39,6 @@ struct LegendEntry {
 }
 
 /// Fails unless a file's name ends in .svg. `option` is what the user gave it by.
-///
-/// # Errors
-/// [`Error::Usage`].
 pub fn check_svg_name(option: &str, path: &Path) -> Result<()> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {
         return Ok(());
@@ -52,7 +49,7 @@ pub fn check_svg_name(option: &str, path: &Path) -> Result<()> {
 /// Draws charts below a title, two side by side, and writes them to `path`.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that does not end in .svg and where there is no chart; [`Error::Output`].
+/// [`Error::Usage`] for another name than one in .svg, and for no chart; [`Error::Output`].
 pub fn write_svg(path: &Path, title: &str, subtitle: &str, charts: &[Chart]) -> Result<()> {
     check_svg_name("--plot", path)?;
     write_text(path, &draw_svg(title, subtitle, charts)?)
@@ -100,7 +97,7 @@ fn draw_svg(title: &str, subtitle: &str, charts: &[Chart]) -> Result<String> {
     Ok(text.map_err(broken)?.replace(|c: char| c.is_control() && c != '\n', " "))
 }
 
-/// Puts the entries of a chart's legend below it, one after the other, in as many lines as they need.
+/// Puts the entries of a chart's legend below it, in as many lines as they need.
 fn place_legend(chart: &ChartLayout) -> Vec<LegendEntry> {
     let [left, _, right, _] = chart.area;
     let (mut x, mut y) = (left, chart.size[1] + LEGEND_LINE);

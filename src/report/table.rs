@@ -5,38 +5,31 @@ use serde::Serialize;
 /// A table. A reader sorts it by clicking on the title of a column.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Table {
-    /// What it shows, in a few words; may be empty.
+    /// A title of a few words; may be empty.
     pub title: String,
-    /// The columns.
     pub columns: Vec<Column>,
     /// The rows, each with a cell for every column.
     pub rows: Vec<Row>,
 }
 
-/// A column of a [`Table`].
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Column {
-    /// Its title.
     pub title: String,
-    /// What its numbers mean and their unit, shown when a pointer rests on the title; may be empty.
+    /// The meaning of its numbers and their unit, shown over the title; may be empty.
     pub help: String,
 }
 
-/// A row of a [`Table`].
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Row {
-    /// Its cells.
     pub cells: Vec<Cell>,
-    /// The part of the section's images that the row is about, in pixels: x, y, width, height. A button shows it there.
+    /// The part of the images that the row is about (x, y, width, height), behind a button.
     pub region: Option<[u32; 4]>,
 }
 
-/// A cell of a [`Table`].
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Cell {
-    /// What it says.
     pub text: String,
-    /// What it is sorted by, if it is a number. Numbers are set to the right.
+    /// The number to sort by, if it is one. Numbers are set to the right.
     pub value: Option<f64>,
     /// The outcome of a check.
     pub status: Option<Status>,
@@ -46,15 +39,12 @@ pub struct Cell {
     pub help: String,
 }
 
-/// The outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// It holds.
     Good,
     /// It holds, but something is to be looked at.
     Warning,
-    /// It does not hold.
     Bad,
 }
 
@@ -65,7 +55,6 @@ impl Table {
         Self { columns, ..Self::default() }
     }
 
-    /// The table with another row.
     pub fn row(mut self, row: Row) -> Self {
         self.rows.push(row);
         self
@@ -86,7 +75,6 @@ impl Table {
         all.iter().map(line).collect()
     }
 
-    /// The table with this title.
     pub fn titled(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
@@ -94,7 +82,6 @@ impl Table {
 }
 
 impl Row {
-    /// A row of these cells.
     pub fn new(cells: impl IntoIterator<Item = Cell>) -> Self {
         Self { cells: cells.into_iter().collect(), region: None }
     }
@@ -112,7 +99,6 @@ impl Cell {
         Self { text: text.into(), value: Some(value), ..Self::default() }
     }
 
-    /// The cell with the outcome of a check.
     pub fn with_status(mut self, status: Status) -> Self {
         self.status = Some(status);
         self
@@ -143,7 +129,7 @@ impl From<f64> for Cell {
     }
 }
 
-/// A number with four significant digits: `0.01234`, `12.34`, `1.234e-7`, `12345`; `inf` and `NaN` as they are.
+/// A number with four significant digits: `0.01234`, `12.34`, `1.234e-7`, `12345`, `inf`, `NaN`.
 pub fn format_number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { value.to_string() };

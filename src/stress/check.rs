@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use crate::tracer::TracerKind;
 
-/// The outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -22,9 +21,7 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bound {
-    /// The largest figure that holds.
     AtMost(f64),
-    /// The smallest figure that holds.
     AtLeast(f64),
 }
 
@@ -45,7 +42,7 @@ pub struct Check {
     pub section: &'static str,
     /// The quantity that was measured, in a few words.
     pub name: String,
-    /// The tracer; `None` for what the CPU does alone.
+    /// The tracer, or `None` for the CPU alone.
     pub tracer: Option<TracerKind>,
     /// The figure; not a number if it could not be measured.
     pub value: f64,
@@ -53,11 +50,9 @@ pub struct Check {
     pub unit: &'static str,
     /// The bound; `None` for figures that are reported only.
     pub bound: Option<Bound>,
-    /// The outcome.
     pub verdict: Verdict,
     /// A sentence on what the figure means; may be empty.
     pub sentence: String,
-    /// Seconds that it took.
     pub seconds: f64,
 }
 
@@ -91,7 +86,6 @@ impl Check {
         Self::new(name, value, unit, Some(Bound::AtLeast(bound)))
     }
 
-    /// A figure without a bound.
     pub fn reported(name: impl Into<String>, value: f64, unit: &'static str) -> Self {
         Self::new(name, value, unit, None)
     }
@@ -112,17 +106,10 @@ impl Check {
         Self { verdict: Verdict::Fails, ..Self::new(name, f64::NAN, "", None) }.says(error.to_string())
     }
 
-    /// The check with a sentence about it.
     pub fn says(self, sentence: impl Into<String>) -> Self {
         Self { sentence: sentence.into(), ..self }
     }
 
-    /// The check as that of a tracer.
-    pub fn of(self, tracer: TracerKind) -> Self {
-        Self { tracer: Some(tracer), ..self }
-    }
-
-    /// `compute`, or `cpu` for what no tracer does.
     pub fn tracer_name(&self) -> &'static str {
         self.tracer.map_or("cpu", TracerKind::name)
     }

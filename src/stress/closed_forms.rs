@@ -1,8 +1,8 @@
 //! Ambient occlusion images against closed forms: the measuring that this suite and tests/ao share.
 //!
-//! An image's pixel is an integral over its footprint, so it is compared with the closed form integrated over the same footprint (Gauss-Legendre, through double-precision
-//! camera rays), not with the value at its centre. Pixels draw their samples independently of each other, so the spread of `pixel - expectation` over the image is the true
-//! standard error of the image's mean, stratification included.
+//! An image's pixel is an integral over its footprint, so it is compared with the closed form
+//! integrated over it (Gauss-Legendre, through double-precision camera rays). Pixels are
+//! independent, so the spread of `pixel - expectation` is the standard error of the image's mean.
 
 use glam::DVec3;
 
@@ -16,23 +16,18 @@ use crate::oracle::camera::camera_ray;
 use crate::scene::{Camera, Scene};
 use crate::tracer::Tracer;
 
-/// What an image should show.
 pub struct Case<'a> {
-    /// Name of the case.
     pub what: &'a str,
-    /// The scene.
     pub scene: &'a Scene,
-    /// The camera.
     pub camera: Camera,
-    /// Options of the image.
     pub options: AoOptions,
-    /// Where a ray meets the surface in question; `None`: the pixel shows something else too and is left out.
+    /// The hit of a ray with the surface; `None`: other things are in the pixel, which is left out.
     pub surface: &'a dyn Fn(&OracleRay) -> Option<DVec3>,
     /// Ambient visibility at that point.
     pub expected: &'a dyn Fn(DVec3) -> f64,
 }
 
-/// How far an image is from its closed form.
+/// Distance of an image from its closed form.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bias {
     /// Mean of the closed form over the pixels that are compared.
@@ -43,11 +38,9 @@ pub struct Bias {
     pub standard_error: f64,
     /// Standard error that independent samples would have.
     pub independent_error: f64,
-    /// Pixels that are compared.
     pub pixels: usize,
-    /// Of these, pixels of which a ray met nothing.
+    /// Pixels among them of which a ray met nothing.
     pub uncovered: usize,
-    /// Samples per pixel.
     pub spp: u32,
 }
 
@@ -78,9 +71,6 @@ impl Case<'_> {
     }
 
     /// Renders the case and compares it with its [`Case::expectations`].
-    ///
-    /// # Errors
-    /// Those of rendering.
     pub fn bias(&self, tracer: &Tracer, expected: &[Option<f64>], control: &mut dyn Control) -> Result<Bias> {
         let image = render(tracer, self.scene, &self.camera, &self.options, control)?;
         Ok(bias(&image.image.film, image.image.spp, expected))
@@ -106,7 +96,7 @@ pub fn bias(film: &Film, spp: u32, expected: &[Option<f64>]) -> Bias {
     out
 }
 
-/// Samples of a film with the value `want` in every sample that meets geometry: how many there are, and how many have another value (0 or 1).
+/// Samples of a film that meet geometry, and those among them whose value (0 or 1) is not `want`.
 pub fn samples_off(film: &Film, spp: u32, want: f32) -> (f64, f64) {
     let spp = f64::from(spp);
     let covered = film.coverage.iter().map(|&c| f64::from(c) * spp).sum();
@@ -116,9 +106,6 @@ pub fn samples_off(film: &Film, spp: u32, want: f32) -> (f64, f64) {
 }
 
 /// Renders an ambient occlusion image through a camera.
-///
-/// # Errors
-/// Those of [`ao::render`].
 pub fn render(
     tracer: &Tracer,
     scene: &Scene,

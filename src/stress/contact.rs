@@ -1,4 +1,5 @@
-//! Section 4, grazing and contact: rays along surfaces, from edges and vertices, and between surfaces that nearly touch; and how much of the spawn offset is needed.
+//! Section 4, grazing and contact: rays along surfaces, from edges and vertices, and between
+//! surfaces that nearly touch; and the need for the spawn offset.
 
 use glam::{DAffine3, DVec3};
 
@@ -15,7 +16,6 @@ use crate::scene::builtin::{SceneTransform, analytic, shapes};
 use crate::scene::{Camera, Geometry, Scene};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "contact",
     title: "Grazing and contact",
@@ -43,7 +43,7 @@ pub fn grazing_rays(count: u32) -> Vec<Ray> {
         .collect()
 }
 
-/// Rays outwards from vertices and middles of edges of a closed convex body around the origin: they leave it. In exact arithmetic none meets it again.
+/// Rays outwards from vertices and edge middles of a closed convex body, which meet nothing.
 pub fn rays_from_edges(oracle: &Oracle, count: usize) -> Vec<Ray> {
     let all = oracle.triangles();
     (0..count)
@@ -66,10 +66,7 @@ pub fn sheets(gap: f64) -> Scene {
     scene_of(vec![(triangles([square(0.0), square(gap)].concat()), vec![DAffine3::IDENTITY])])
 }
 
-/// Rays at [`sheets`] from both sides that see the sheet that is behind: of triangles 0 and 1 from above, and 2 and 3 from below.
-///
-/// # Errors
-/// Those of tracing.
+/// Counts rays at [`sheets`] from both sides that hit the sheet behind the nearer one.
 pub fn wrong_sides(tracer: &Tracer, count: u32, control: &mut dyn Control) -> Result<usize> {
     let rays: Vec<Ray> = (0..count)
         .map(|i| {
@@ -95,14 +92,14 @@ pub struct Slack {
     pub roundings: f64,
     /// Rays that meet the plane again with the offset as it is.
     pub self_hits: usize,
-    /// By how much all offsets could be smaller before a ray meets the plane again; infinite if rays from the plane itself do not.
+    /// Factor by which offsets could be smaller before a ray meets the plane again, or infinity.
     pub factor: f64,
     /// Rays between the plane and a sheet at twice the largest offset that do not meet the sheet.
     pub bridged: usize,
 }
 
-/// Spawned rays of an image of a plane through `point` with unit normal `normal` (relative to the scene's origin), traced again with other offsets: by bisection, how much
-/// smaller they could be. `multiply` scales the offset of the rays first, which is 1 but for a test.
+/// Spawned rays of an image of a plane through `point` with unit normal `normal`, traced again with
+/// smaller offsets by bisection. `multiply` scales the offset first.
 ///
 /// # Errors
 /// Those of rendering and tracing; [`Error::Scene`] if the image shows nothing.
@@ -120,6 +117,8 @@ pub fn slack(
     if rays.is_empty() {
         return Err(Error::Scene("no ray was spawned".into()));
     }
+
+    // Traces them with offsets of any size.
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let height = |r: &Ray| (wide(r.origin) - point).dot(normal);
     let with = |factor: f64| -> Vec<Ray> {
@@ -134,7 +133,8 @@ pub fn slack(
     let reach = rays.iter().map(|r| wide(r.origin).abs().max_element()).fold(0.0, f64::max);
     let as_is = with(multiply);
     let self_hits = hits(&as_is, tracer)?;
-    // the smallest multiple without a hit, between `bad` and `good`
+
+    // The smallest multiple without a hit is between `bad` and `good`.
     let (mut bad, mut good) = (0.0f64, multiply);
     let mut factor = f64::INFINITY;
     if self_hits == 0 && hits(&with(0.0), tracer)? > 0 {
@@ -159,7 +159,7 @@ pub fn slack(
 pub fn slack_planes() -> Vec<(String, Scene, DVec3, DVec3)> {
     let mut out = Vec::new();
     for (scale, offset) in [(1e-6, 0.0), (1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1e6, 0.0), (1.0, 1e7)] {
-        for (how, turn) in [("flat", 0.0), ("tilted", 0.6)] {
+        for (orientation, turn) in [("flat", 0.0), ("tilted", 0.6)] {
             let place = SceneTransform { scale, offset: DVec3::splat(offset) };
             let mut scene = analytic::plane(10.0, place);
             let about = DAffine3::from_translation(place.offset)
@@ -171,16 +171,13 @@ pub fn slack_planes() -> Vec<(String, Scene, DVec3, DVec3)> {
             let normal = about.transform_vector3(DVec3::Y);
             let point = place.offset - scene.origin();
             let far = if offset == 0.0 { String::new() } else { format!(", {offset:e} from the origin") };
-            out.push((format!("{how} plane, scale {scale:e}{far}"), scene, normal, point));
+            out.push((format!("{orientation} plane, scale {scale:e}{far}"), scene, normal, point));
         }
     }
     out
 }
 
 /// The plane of [`slack_planes`] with a sheet over it at this distance.
-///
-/// # Errors
-/// Those of tracing.
 fn bridged(
     kind: TracerKind,
     setup: &super::Setup,
@@ -208,6 +205,7 @@ fn run(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
     let count = effort.pick(20_000, 1_000_000);
 
+    // Rays along a plane meet it, and rays that it spawns do not.
     let name = "rays at 1e-4 rad meet the plane";
     let plane = analytic::plane(10.0, SceneTransform::default());
     let oracle = Oracle::new(&plane, plane.origin());
@@ -222,6 +220,7 @@ fn run(session: &mut Session) -> Result<()> {
     grazed.cameras[0] = Camera::look_at(DVec3::new(0.0, 4.0 * GRAZING, 4.0), DVec3::new(0.0, 0.0, 0.0), DVec3::Y, 2e-5);
     session.measure_each(name, &kinds, |s, kind, w| super::scale::check_exact(s, kind, name, &grazed, 1.0, w))?;
 
+    // Rays from edges, vertices and corners of closed bodies leave them.
     let mut body = analytic::closed_box(1.0, SceneTransform::default());
     body.meshes[0].geometry = shapes::icosphere(1.0, 4);
     let oracle = Oracle::new(&body, body.origin());
@@ -237,6 +236,7 @@ fn run(session: &mut Session) -> Result<()> {
     corner.cameras[0] = Camera::look_at(DVec3::splat(1.0) + DVec3::new(1.3, 1.1, 0.9) * 1e-3, DVec3::splat(1.0), DVec3::Y, 0.9);
     session.measure_each(name, &kinds, |s, kind, w| super::scale::check_exact(s, kind, name, &corner, 1.0, w))?;
 
+    // Two surfaces close to one another are told apart.
     let name = "surfaces 1e-6 apart: the near one is seen";
     let near = sheets(GAP);
     session.measure_each(name, &kinds, |s, kind, w| {
@@ -249,6 +249,7 @@ fn run(session: &mut Session) -> Result<()> {
     let thin = thin_sheet(GAP);
     session.measure_each(name, &kinds, |s, kind, w| super::scale::check_exact(s, kind, name, &thin, 1.0, w))?;
 
+    // Offsets are no larger than needed, over scale and place.
     for (what, scene, normal, point) in slack_planes() {
         let scale = scene.instances[0].object_to_world.matrix3.x_axis.length();
         let (offset, gap) = (format!("spawn offset: {what}"), format!("gap bridged: {what}"));

@@ -1,5 +1,5 @@
-//! Counters that pass 2^24, beyond which single precision skips whole numbers, and that come to 2^32: samples of a film, and numbers of frames. Part of section 7,
-//! [`super::long_runs`].
+//! Counters beyond 2^24, where single precision skips whole numbers, and to 2^32: samples of a
+//! film, and numbers of frames. Part of section 7, [`super::long_runs`].
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::tracer::{Tracer, TracerKind};
 
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// A film of which `samples` samples of `radiance` were taken of each pixel, with the sums that f64 has.
+/// A film of `samples` samples of `radiance` in each pixel, with sums in f64.
 pub fn film_after(size: [u32; 2], samples: u32, radiance: [f32; 3]) -> Option<FilmState> {
     let pixels = size[0] as usize * size[1] as usize;
     let compensated = |value: f32| {
@@ -46,10 +46,7 @@ fn go_on(options: &PathOptions, from: FilmState, spp: u32) -> PathOptions {
 /// Pixels of the film of [`film_drift`].
 pub const SIZE: [u32; 2] = [8, 8];
 
-/// Largest relative distance from the truth of a film of [`super::long_runs::constant`] that begins as `film` and goes on to `last` samples.
-///
-/// # Errors
-/// Those of rendering.
+/// Largest relative error of a film of [`super::long_runs::constant`] continued to `last` samples.
 pub fn film_drift(setup: &Setup, kind: TracerKind, film: Option<FilmState>, last: u32, watch: &mut Watch) -> Result<f64> {
     let scene = constant();
     let flat = FlatScene::new(&scene);
@@ -59,26 +56,24 @@ pub fn film_drift(setup: &Setup, kind: TracerKind, film: Option<FilmState>, last
     let counted = image.film.samples.iter().all(|&n| n == last);
     let off = |(k, mean): (usize, &f32)| (f64::from(*mean) / f64::from(RADIANCE[k % 3]) - 1.0).abs();
     let worst = image.film.mean.iter().enumerate().map(off).fold(0.0, f64::max);
-    // variances are rounding errors of sums of squares: beside 2^24 samples they may not exceed a thousandth of the square
+    // variances are rounding errors of sums of squares: at most a thousandth of the square at 2^24
     let spread =
         image.film.variance.iter().enumerate().map(|(k, v)| f64::from(v / RADIANCE[k % 3].powi(2))).fold(0.0, f64::max);
     Ok(if counted && not_finite(&image.film) == 0 && spread < 1e-3 { worst } else { f64::NAN })
 }
 
-/// Samples of an image: their mean, its standard error, and how many pixels had a sample unlike another.
+/// Statistics of an image's samples: mean, standard error, and pixels whose samples differ.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampled {
-    /// Mean over all pixels.
     pub mean: f64,
-    /// Standard error of the mean.
     pub error: f64,
     /// Pixels whose samples differ.
     pub varied: usize,
 }
 
 impl Sampled {
-    /// Of each pixel's sum and sum of squares over `count` samples.
-    pub fn of(sums: &[f64], squares: &[f64], count: u32) -> Self {
+    /// Statistics from each pixel's sum and sum of squares over `count` samples.
+    pub fn from_sums(sums: &[f64], squares: &[f64], count: u32) -> Self {
         let (n, pixels) = (f64::from(count), sums.len() as f64);
         let mean = sums.iter().sum::<f64>() / n / pixels;
         let variances = || sums.iter().zip(squares).map(|(s, q)| (q / n - (s / n).powi(2)).max(0.0));
@@ -86,7 +81,7 @@ impl Sampled {
         Self { mean, error: (variances().sum::<f64>() / n).sqrt() / pixels, varied }
     }
 
-    /// Distance of the means, in standard errors. Not a number where samples do not differ as they do in the other.
+    /// Distance of the means in standard errors; NaN where samples do not differ as in the other.
     pub fn distance(&self, other: &Self) -> f64 {
         let is_alike = self.varied as f64 > 0.9 * other.varied as f64 && (0.7..1.4).contains(&(self.error / other.error));
         if is_alike { (self.mean - other.mean).abs() / self.error.hypot(other.error) } else { f64::NAN }
@@ -94,9 +89,6 @@ impl Sampled {
 }
 
 /// The samples `first` to `first + count` of an image.
-///
-/// # Errors
-/// Those of rendering.
 pub fn samples(setup: &Setup, kind: TracerKind, first: u32, count: u32, watch: &mut Watch) -> Result<Sampled> {
     let scene = builtin::by_name("cornell-box").ok_or_else(|| Error::Scene("no Cornell box".into()))?;
     let flat = FlatScene::new(&scene);
@@ -111,13 +103,10 @@ pub fn samples(setup: &Setup, kind: TracerKind, first: u32, count: u32, watch: &
         sum.zip(excess).map(|(s, e)| f64::from(s) - f64::from(e)).collect::<Vec<_>>()
     };
     // green, after red, and after three sums its squares
-    Ok(Sampled::of(&total(2), &total(8), count))
+    Ok(Sampled::from_sums(&total(2), &total(8), count))
 }
 
-/// Frames of a scene from the frame number `first` on, with the camera a step to the side in each: the pixels of each that show geometry.
-///
-/// # Errors
-/// Those of the frames.
+/// Frames of a scene from number `first` on, the camera a step aside in each: pixels of geometry.
 pub fn frames_from(tracer: &Tracer, scene: &Scene, settings: &Settings, first: u32, count: u32) -> Result<Vec<Vec<f32>>> {
     let size = [32, 18];
     let mut realtime = Realtime::new(tracer, size, settings, &[])?;
@@ -134,9 +123,6 @@ pub fn frames_from(tracer: &Tracer, scene: &Scene, settings: &Settings, first: u
 }
 
 /// [`frame_distance`] of frames from `first` on and as many from 0 on.
-///
-/// # Errors
-/// Those of the frames.
 pub fn frame_bias(setup: &Setup, kind: TracerKind, first: u32, count: u32) -> Result<f64> {
     let scene = builtin::by_name("stairs").ok_or_else(|| Error::Scene("no stairs".into()))?;
     let tracer = Tracer::new(setup.device(), kind, &FlatScene::new(&scene), super::degenerate::NEEDS)?;
@@ -146,7 +132,7 @@ pub fn frame_bias(setup: &Setup, kind: TracerKind, first: u32, count: u32) -> Re
     Ok(frame_distance(&frames(first)?, &frames(0)?))
 }
 
-/// Distance of the means of two series of frames, in standard errors. Not a number where a frame is the one before it.
+/// Distance of the means of two series of frames in standard errors; NaN for a repeated frame.
 pub fn frame_distance(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
     let mean = |frames: &[Vec<f32>]| {
         if frames.windows(2).any(|w| w[0] == w[1]) {
@@ -161,10 +147,6 @@ pub fn frame_distance(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
     (a - b).abs() / e.hypot(f)
 }
 
-/// The checks of the section.
-///
-/// # Errors
-/// Those of [`Session::measure_all`].
 pub(super) fn run(session: &mut Session) -> Result<()> {
     let effort = session.setup().effort();
     let (shading, kinds) = (session.setup().shading_tracers(), session.setup().tracers());

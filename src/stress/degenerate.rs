@@ -1,4 +1,4 @@
-//! Section 3, degenerate geometry: data that no one should send, through every tracer. Answers are held against a double-precision tracer that tests every primitive.
+//! Section 3, degenerate geometry through every tracer, against brute force in double precision.
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -25,7 +25,6 @@ use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh, load};
 use crate::tracer::{Needs, Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "degenerate",
     title: "Degenerate geometry",
@@ -70,7 +69,6 @@ pub fn random_point(i: u32, k: u32) -> DVec3 {
     DVec3::new(random(i, k), random(i, k + 1), random(i, k + 2)) * 2.0 - 1.0
 }
 
-/// A ray without an end.
 pub fn ray(origin: DVec3, direction: DVec3) -> Ray {
     Ray { origin: origin.as_vec3().to_array(), tmin: 0.0, direction: direction.as_vec3().to_array(), tmax: f32::INFINITY }
 }
@@ -90,7 +88,7 @@ pub fn rays_at_edges(oracle: &Oracle) -> Vec<Ray> {
     rays
 }
 
-fn here(geometry: Geometry) -> Scene {
+fn instance_at_origin(geometry: Geometry) -> Scene {
     scene_of(vec![(geometry, vec![DAffine3::IDENTITY])])
 }
 
@@ -98,7 +96,7 @@ fn oracle_of(scene: &Scene) -> Oracle {
     Oracle::new(scene, scene.origin())
 }
 
-/// `count` triangles, half of them without area: points, segments, repeated corners; slivers and sound triangles among them.
+/// `count` triangles, half of them without area, slivers and sound ones among them.
 pub fn without_area(count: u32, rays: usize) -> (Scene, Vec<Ray>) {
     let corners = (0..count).map(|i| {
         let [a, b, c] = [random_point(i, 0), random_point(i, 3), random_point(i, 6)];
@@ -110,7 +108,7 @@ pub fn without_area(count: u32, rays: usize) -> (Scene, Vec<Ray>) {
             _ => [a, a + b * 0.1, a + c * 0.1],
         }
     });
-    let scene = here(triangles(corners));
+    let scene = instance_at_origin(triangles(corners));
     let oracle = oracle_of(&scene);
     let mut set = random_rays(&oracle, rays, 2);
     set.extend(rays_at_edges(&oracle));
@@ -124,7 +122,7 @@ pub fn scales_together(count: u32, rays: usize) -> (Scene, Vec<Ray>) {
         let size = 10f64.powf(random(i, 4) * 12.0 - 6.0);
         [at, at + random_point(i, 5) * size, at + random_point(i, 8) * size]
     });
-    let scene = here(triangles(corners));
+    let scene = instance_at_origin(triangles(corners));
     let oracle = oracle_of(&scene);
     let mut set = random_rays(&oracle, rays, 3);
     for (i, t) in oracle.triangles().iter().enumerate() {
@@ -144,7 +142,7 @@ pub fn largest_coordinates(count: u32, rays: usize) -> (Scene, Vec<Ray>) {
         let at = random_point(i, 0) * 0.9e12;
         [at, at + random_point(i, 3) * 1e11, at + random_point(i, 6) * 1e11]
     });
-    let scene = here(triangles(corners));
+    let scene = instance_at_origin(triangles(corners));
     let oracle = oracle_of(&scene);
     let mut set = random_rays(&oracle, rays, 3);
     for (i, t) in oracle.triangles().iter().enumerate() {
@@ -155,8 +153,8 @@ pub fn largest_coordinates(count: u32, rays: usize) -> (Scene, Vec<Ray>) {
     (scene, set)
 }
 
-/// Triangles each of which is a fraction of the size of the one that holds it, all around one point, down to where single precision ends; and a second, steeper nest. A tree
-/// that follows the geometry would be as deep. `gentle` and `steep` say which there are.
+/// Triangles each of which is a fraction of the one that holds it, around one point, down to where
+/// single precision ends; and a second, steeper nest: a deep tree. `gentle` and `steep` choose.
 pub fn nested(gentle: bool, steep: bool, rays: usize) -> (Scene, Vec<Ray>) {
     let shape = [DVec3::new(-1.0, -0.6, 0.0), DVec3::new(1.0, -0.6, 0.2), DVec3::new(0.0, 1.0, -0.1)];
     // apart in z by more than rounding, so that there is one answer
@@ -167,7 +165,7 @@ pub fn nested(gentle: bool, steep: bool, rays: usize) -> (Scene, Vec<Ray>) {
     // sizes fall by half per level, to the end of the exponent's range where products underflow
     let falling = (0..if steep { 60 } else { 0 })
         .map(|k| shape.map(|p| p * 0.5f64.powi(k) + DVec3::X * 3.0 + DVec3::Z * (0.6 * 0.5f64.powi(k))));
-    let scene = here(triangles(chain.chain(falling)));
+    let scene = instance_at_origin(triangles(chain.chain(falling)));
     let mut set = random_rays(&oracle_of(&scene), rays, 5);
     for i in 0..rays as u32 / 5 {
         // at a point near the common one, nearer by many scales
@@ -186,7 +184,7 @@ pub fn nested_spheres(rays: usize) -> (Scene, Vec<Ray>) {
         .chain(
             (0..100).map(|i| Sphere { center: random_point(i, 0).as_vec3() * 2.0, radius: 1e-5 + 1e-3 * random(i, 3) as f32 }),
         );
-    let scene = here(Geometry::Spheres(balls.collect()));
+    let scene = instance_at_origin(Geometry::Spheres(balls.collect()));
     let oracle = oracle_of(&scene);
     let mut set = random_rays(&oracle, rays, 6);
     for (i, s) in oracle.spheres().iter().enumerate() {
@@ -198,12 +196,12 @@ pub fn nested_spheres(rays: usize) -> (Scene, Vec<Ray>) {
     (scene, set)
 }
 
-/// A box around coordinates so large that neighbours of a float are apart by a thousandth of its size, kept from being moved to the origin by a triangle there, and rays at its
-/// shared edges.
+/// A box around coordinates so large that neighbours of a float are a thousandth of its size apart,
+/// held there by a triangle at the origin, and rays at its shared edges.
 pub fn coarse_coordinates(rays: usize) -> (Scene, Vec<Ray>) {
     let place = SceneTransform { scale: 100.0, offset: DVec3::new(1e6, -2e6, 3e6) };
     let mut scene = builtin::bake(&analytic::closed_box(1.0, place));
-    let far = here(triangles([[DVec3::ZERO, DVec3::X, DVec3::Y]]));
+    let far = instance_at_origin(triangles([[DVec3::ZERO, DVec3::X, DVec3::Y]]));
     scene.meshes.extend(far.meshes);
     scene.instances.push(Instance { name: String::new(), mesh: 1, object_to_world: DAffine3::IDENTITY });
     let oracle = oracle_of(&scene);
@@ -212,7 +210,7 @@ pub fn coarse_coordinates(rays: usize) -> (Scene, Vec<Ray>) {
     (scene, set)
 }
 
-/// `count` times the same triangle, of the same vertices or each of its own: no plane divides them. The second scene has it once.
+/// `count` times one triangle, of the same vertices or its own. The second scene has it once.
 pub fn coincident(count: u32, own_vertices: bool) -> [Scene; 2] {
     let corners = [DVec3::new(-1.0, -0.5, 0.1), DVec3::new(1.0, -0.4, -0.2), DVec3::new(0.1, 1.0, 0.3)];
     let once = triangles([corners]);
@@ -222,11 +220,11 @@ pub fn coincident(count: u32, own_vertices: bool) -> [Scene; 2] {
         Geometry::Triangles(mesh) => mesh.indices = vec![[0, 1, 2]; count as usize],
         Geometry::Spheres(_) => {}
     }
-    [here(many), here(once)]
+    [instance_at_origin(many), instance_at_origin(once)]
 }
 
-/// `count` triangles in one plane, each a little larger than the one before and around it, as triangles of one mesh or as instances of a small one: a ray that meets
-/// the smallest has to be tested against all of them, because no one is nearer. The second scene has the largest alone.
+/// `count` triangles in one plane, each a little larger than the one before, in one mesh or as
+/// instances: the smallest is tested with all others. The second scene has the largest alone.
 pub fn overlapping(count: u32, as_instances: bool) -> [Scene; 2] {
     let corners = [DVec3::new(-0.5, -0.25, 0.0), DVec3::new(0.5, -0.3, 0.0), DVec3::new(0.05, 0.5, 0.0)];
     let size = |k: u32| 1.0 + f64::from(k) / f64::from(count);
@@ -235,9 +233,9 @@ pub fn overlapping(count: u32, as_instances: bool) -> [Scene; 2] {
         let places = (0..count).map(|k| DAffine3::from_scale(DVec3::new(size(k), size(k), 1.0)));
         scene_of(vec![(triangles([corners]), places.collect())])
     } else {
-        here(triangles((0..count).map(|k| corners.map(|c| c * size(k)))))
+        instance_at_origin(triangles((0..count).map(|k| corners.map(|c| c * size(k)))))
     };
-    [many, here(sized(count - 1))]
+    [many, instance_at_origin(sized(count - 1))]
 }
 
 /// Answers of the oracle that tests every primitive.
@@ -246,9 +244,6 @@ pub fn truth(oracle: &Oracle, rays: &[Ray]) -> Vec<OracleHit> {
 }
 
 /// A tracer's answers, closest hits and any hits, against the truth.
-///
-/// # Errors
-/// Those of tracing.
 pub fn judge(
     tracer: &Tracer,
     oracle: &Oracle,
@@ -275,10 +270,7 @@ pub fn parity_check(name: &str, reports: &[ParityReport; 2]) -> Check {
     Check::at_most(name, (closest.unexplained + any.unexplained) as f64, "unexplained", 0.0).says(sentence)
 }
 
-/// Values of ambient occlusion images and auxiliary outputs that are no numbers or beyond their range. The tracer needs normals and albedo.
-///
-/// # Errors
-/// Those of rendering.
+/// Counts values of ambient occlusion images and auxiliary outputs that are NaN or out of range.
 pub fn unsound_values(tracer: &Tracer, scene: &Scene, control: &mut dyn Control) -> Result<usize> {
     let (lo, hi) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let camera = CameraRecord::new(&Camera::framing(lo, hi, 1.0), scene.origin(), 1.0);
@@ -296,7 +288,7 @@ pub fn unsound_values(tracer: &Tracer, scene: &Scene, control: &mut dyn Control)
     Ok(bad)
 }
 
-/// What normals and albedo need.
+/// The needs of normals and albedo.
 pub const NEEDS: Needs = Needs {
     normals: true,
     albedo: true,
@@ -315,6 +307,8 @@ fn run(session: &mut Session) -> Result<()> {
     let effort = session.setup().effort();
     let kinds = session.setup().tracers();
     let (count, rays) = effort.pick((600, 3000), (4000, 200_000));
+
+    // Every scene comes with rays that are hard for it.
     let empty = Geometry::Triangles(TriangleMesh::default());
     let cases: Vec<(&str, (Scene, Vec<Ray>))> = vec![
         ("triangles without area", without_area(count, rays)),
@@ -324,12 +318,21 @@ fn run(session: &mut Session) -> Result<()> {
         ("nested and coincident spheres", nested_spheres(rays)),
         ("coordinates as coarse as a thousandth of a box", coarse_coordinates(rays)),
         ("one triangle", {
-            let one = here(triangles([[DVec3::new(-1.0, 0.0, 0.2), DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.3, 0.9, -0.4)]]));
+            let one = instance_at_origin(triangles([[
+                DVec3::new(-1.0, 0.0, 0.2),
+                DVec3::new(1.0, 0.1, 0.0),
+                DVec3::new(0.3, 0.9, -0.4),
+            ]]));
             let set = random_rays(&oracle_of(&one), rays, 1);
             (one, set)
         }),
-        ("an empty mesh", (here(empty), (0..1000).map(|i| ray(random_point(i, 0), random_point(i, 3))).collect())),
+        (
+            "an empty mesh",
+            (instance_at_origin(empty), (0..1000).map(|i| ray(random_point(i, 0), random_point(i, 3))).collect()),
+        ),
     ];
+
+    // Hits agree with the oracle, and images are numbers.
     for (name, (scene, set)) in &cases {
         let oracle = oracle_of(scene);
         let (truth, images) = (truth(&oracle, set), format!("images: {name}"));
@@ -343,6 +346,8 @@ fn run(session: &mut Session) -> Result<()> {
             })?;
         }
     }
+
+    // Needles, coincident triangles and broken files have checks of their own.
     needles(session)?;
     coincident_triangles(session)?;
     one_place(session)?;
@@ -350,9 +355,6 @@ fn run(session: &mut Session) -> Result<()> {
 }
 
 /// Most samples of a body's image that may see the body itself, if it is convex: none.
-///
-/// # Errors
-/// Those of rendering.
 pub fn self_occluded(tracer: &Tracer, scene: &Scene, size: u32, spp: u32, control: &mut dyn Control) -> Result<(f64, f64)> {
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("no geometry".into()))?;
     let middle = (lo + hi) * 0.5;
@@ -395,10 +397,8 @@ const SECONDS: f64 = 60.0;
 /// Bytes of device memory that a primitive or an instance of a hard scene may take.
 const BYTES: u64 = 1024;
 
-/// The check of `count` surfaces in one place, by [`coincident`] or [`overlapping`]: hits are those of the second scene, which has one. Time and memory are bounded.
-///
-/// # Errors
-/// Those of tracing: some drivers end long traversals early.
+/// The check of `count` surfaces in one place, by [`coincident`] or [`overlapping`]: hits are those
+/// of the second scene, in bounded time and memory.
 pub fn check_as_one(
     setup: &Setup,
     kind: TracerKind,
@@ -442,8 +442,8 @@ fn coincident_triangles(session: &mut Session) -> Result<()> {
         // drivers test them all
         let most = if kind == TracerKind::Compute { 100_000 } else { effort.pick(10_000, 100_000) };
         for count in [3000, most] {
-            for (own_vertices, how) in [(false, ""), (true, ", vertices of their own")] {
-                let name = format!("{count} coincident triangles{how}");
+            for (own_vertices, suffix) in [(false, ""), (true, ", vertices of their own")] {
+                let name = format!("{count} coincident triangles{suffix}");
                 session.measure(&name, Some(kind), |s, w| {
                     check_as_one(s, kind, &name, count, &coincident(count, own_vertices), w)
                 })?;
@@ -471,9 +471,6 @@ fn one_place(session: &mut Session) -> Result<()> {
 }
 
 /// Loads a Wavefront OBJ file of one triangle with these corners.
-///
-/// # Errors
-/// [`Error::Output`]; those of the loader.
 pub fn triangle_file(corners: [&str; 3]) -> Result<Scene> {
     let dir = tempfile::tempdir().map_err(|e| Error::write("a temporary folder", &e))?;
     let file = dir.path().join("triangle.obj");
@@ -494,10 +491,7 @@ pub const FILES: &[(&str, [&str; 3], bool)] = &[
     ("denormal 1e-40", ["1e-40 0 0", "0 1e-40 0", "0 0 1e-40"], true),
 ];
 
-/// The right answer, or an error that names the file: what may not load must not, and what loads renders to numbers.
-///
-/// # Errors
-/// Those of rendering.
+/// The right answer, or an error that names the file: files that load must render to numbers.
 pub fn check_file(
     setup: &Setup,
     kind: TracerKind,

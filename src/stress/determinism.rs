@@ -1,5 +1,5 @@
-//! Section 9, determinism: the same seed gives the same bits: over runs, launches of other sizes, restarts of the program and numbers of threads. Over tracers and vector widths
-//! images agree within a bound.
+//! Section 9, determinism: the same seed gives the same bits over runs, sizes of launches, restarts
+//! and numbers of threads, and close images over tracers and vector widths.
 
 use std::cell::OnceCell;
 use std::path::Path;
@@ -15,7 +15,6 @@ use crate::integrators::path::PathOptions;
 use crate::output::{self, Image};
 use crate::scene::{Scene, builtin};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "determinism",
     title: "Determinism",
@@ -24,20 +23,17 @@ pub const SECTION: Section = Section {
     run,
 };
 
-/// Largest share of an image's pixels that another tracer may render differently by more than a rounding.
+/// Largest share of pixels that another tracer may render differently by more than a rounding.
 const SHARE: f64 = 0.02;
-/// What is more than a rounding, of ambient visibility.
+/// Ambient visibility that is more than a rounding.
 const STEP: f32 = 1e-5;
 
 /// Values of two images that differ in any bit; all, if their numbers do.
 pub fn different_bits(a: &[f32], b: &[f32]) -> usize {
-    match a.len() == b.len() {
-        true => a.iter().zip(b).filter(|(a, b)| a.to_bits() != b.to_bits()).count(),
-        false => a.len().max(b.len()),
-    }
+    if a.len() == b.len() { a.iter().zip(b).filter(|(a, b)| a.to_bits() != b.to_bits()).count() } else { a.len().max(b.len()) }
 }
 
-/// Share of the values of two images that differ by more than `STEP`, and the difference of their means.
+/// Share of two images' values that differ by more than `STEP`, and the difference of their means.
 pub fn difference(a: &[f32], b: &[f32]) -> (f64, f64) {
     let n = a.len().min(b.len()).max(1) as f64;
     let differ = a.iter().zip(b).filter(|(a, b)| (*a - *b).is_nan() || (*a - *b).abs() > STEP).count() as f64;
@@ -102,8 +98,8 @@ fn masked_tiles(setup: &Setup, kind: crate::tracer::TracerKind, name: &str, scen
     let tile_mask = TileMask::new(&flat, &record, whole.samples.size, whole.samples.spp).map(std::sync::Arc::new);
     let masked = tile_mask.is_some();
     let some = ao::render(&tracer, &record, &whole.with_samples(|s| s.tile_mask = tile_mask), watch)?.image.film.mean;
-    let how = if masked { "some tiles were left out" } else { "no tile could be left out" };
-    Ok(Check::at_most(name, different_bits(&all, &some) as f64, "pixels", 0.0).says(format!("of {} differ; {how}", all.len())))
+    let note = if masked { "some tiles were left out" } else { "no tile could be left out" };
+    Ok(Check::at_most(name, different_bits(&all, &some) as f64, "pixels", 0.0).says(format!("of {} differ; {note}", all.len())))
 }
 
 /// Renders an image in a process of its own, with these variables of its environment.
@@ -149,6 +145,7 @@ fn restarts(session: &mut Session) -> Result<()> {
     };
     let dir = tempfile::tempdir().map_err(|e| Error::write("a temporary folder", &e))?;
     let file = dir.path().join("image.exr");
+
     // the image that all others are compared with: rendered by the first check that is wanted
     let first = OnceCell::new();
     let unchanged = |s: &Setup| -> Result<&Vec<f32>> {
@@ -166,6 +163,8 @@ fn restarts(session: &mut Session) -> Result<()> {
         let why = "the device is no CPU: its driver says how it divides work";
         return session.measure(threads, None, |_, _| Ok(Check::not_applicable(threads, why)));
     }
+
+    // Threads change no bit, and vector widths little.
     for count in ["1", "2", "8"] {
         let name = format!("LP_NUM_THREADS={count}");
         session.measure(&name, None, |s, _| {

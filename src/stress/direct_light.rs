@@ -1,5 +1,5 @@
-//! Direct light against closed forms: at scales from 1e-6 to 1e6, and through mirrored, sheared and non-uniform transforms and the nested nodes of a glTF file. Part of section 1,
-//! [`super::scale`].
+//! Direct light against closed forms at scales from 1e-6 to 1e6, through mirrored, sheared and
+//! non-uniform transforms and nested glTF nodes. Part of section 1, [`super::scale`].
 
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -14,14 +14,12 @@ use crate::oracle::closed_form::polygon_form_factor;
 use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Light, LightKind, Scene};
 
-/// Albedo of the floors.
 const ALBEDO: f64 = 0.6;
-/// Radiance of emitters.
 const EMITTED: f64 = 5.0;
 /// Side of the floors, in units of their scale.
 const SIDE: f64 = 10.0;
 
-/// A floor of `scale` units that a light of each kind meets, and the radiance that it reflects. The camera sees its middle.
+/// A floor of `scale` units that a light of each kind meets, and its reflected radiance.
 pub fn lit_floors(scale: f64) -> Vec<(&'static str, Scene, f64)> {
     let at = DVec3::new(0.6, 0.8, 0.0) * scale;
     let lit = |kind: LightKind, intensity: f64| {
@@ -59,7 +57,7 @@ fn unlit_floor(scale: f64) -> Scene {
     sampling::scene_of(vec![(shapes::floor(DVec3::ZERO, SIDE * scale), sampling::matte(ALBEDO as f32))], camera)
 }
 
-/// Transforms of nested nodes, outermost first: turns and stretches whose product is sheared and mirrored.
+/// Transforms of nested nodes, outermost first, whose product is sheared and mirrored.
 fn nested_nodes() -> [(DVec3, DQuat, DVec3); 3] {
     let turn = |x: f64, y: f64, z: f64| DQuat::from_euler(glam::EulerRot::XYZ, x, y, z);
     [
@@ -69,15 +67,15 @@ fn nested_nodes() -> [(DVec3, DQuat, DVec3); 3] {
     ]
 }
 
-/// A scene of [`lit_floors`] as a glTF file has it whose meshes and lights are in nested nodes: the same in the world, but for rounding. Spheres are no part of glTF.
-///
-/// # Errors
-/// [`crate::Error::Output`]; those of the loader.
+/// A scene of [`lit_floors`] from a glTF file with meshes and lights in nested nodes: the same but
+/// for rounding. Spheres are no part of glTF.
 pub fn nested(scene: &Scene) -> Result<Scene> {
     let nodes = nested_nodes();
     let to_world =
         nodes.iter().fold(DAffine3::IDENTITY, |m, &(t, r, s)| m * DAffine3::from_scale_rotation_translation(s, r, t));
     let (inverse, mirrors) = (to_world.inverse(), to_world.matrix3.determinant() < 0.0);
+
+    // Writes buffers, views and accessors.
     let trs = |k: usize, children: Vec<usize>| {
         let (t, r, s) = nodes[k];
         json!({ "translation": t.to_array(), "rotation": r.to_array(), "scale": s.to_array(), "children": children })
@@ -93,6 +91,8 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
         accessors.push(accessor);
         accessors.len() - 1
     };
+
+    // Puts meshes and lights into the innermost node's space.
     let mut leaves: Vec<Value> = Vec::new();
     let mut meshes: Vec<Value> = Vec::new();
     for mesh in &scene.meshes {
@@ -112,10 +112,10 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
     }
     let mut lights: Vec<Value> = Vec::new();
     for light in &scene.lights {
-        let mut of = json!({ "intensity": light.intensity.x });
-        of["type"] = match light.kind {
+        let mut entry = json!({ "intensity": light.intensity.x });
+        entry["type"] = match light.kind {
             LightKind::Spot { inner_angle, outer_angle } => {
-                of["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
+                entry["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
                 json!("spot")
             }
             LightKind::Directional { .. } => json!("directional"),
@@ -128,8 +128,10 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
             "rotation": DQuat::from_rotation_arc(DVec3::NEG_Z, along).to_array(),
             "extensions": { "KHR_lights_punctual": { "light": lights.len() } },
         }));
-        lights.push(of);
+        lights.push(entry);
     }
+
+    // Writes the document and loads it.
     let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, &bytes);
     let children = (3..3 + leaves.len()).collect();
     let nodes: Vec<Value> = [trs(0, vec![1]), trs(1, vec![2]), trs(2, children)].into_iter().chain(leaves).collect();
@@ -153,10 +155,6 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
     Ok(loaded)
 }
 
-/// The checks of the section.
-///
-/// # Errors
-/// Those of [`Session::measure_all`].
 pub(super) fn run(session: &mut Session) -> Result<()> {
     for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
         for (what, scene, expected) in lit_floors(scale) {

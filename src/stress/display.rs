@@ -1,4 +1,5 @@
-//! Section 8, filters and display: constants and hot pixels ([`super::hot_pixel`]) through every filter, extreme radiance and NaN through every tone map and the sRGB transfer function.
+//! Section 8, filters and display: constants and hot pixels ([`super::hot_pixel`]) through every
+//! filter, extreme radiance and NaN through every tone map and the sRGB transfer function.
 
 use glam::DVec3;
 
@@ -15,7 +16,6 @@ use crate::realtime::{Filter, FilterKind, Preset, Settings};
 use crate::scene::builtin::{SceneTransform, analytic, shapes};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "display",
     title: "Filters and display",
@@ -24,7 +24,6 @@ pub const SECTION: Section = Section {
     run,
 };
 
-/// All tone maps.
 pub const TONE_MAPS: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Exponential, ToneMap::Reinhard, ToneMap::Neutral, ToneMap::Agx];
 
 /// Greys from 0 to beyond what any display shows.
@@ -38,7 +37,7 @@ pub fn falls(map: impl Fn(f32) -> f32, tolerance: f32) -> usize {
     mapped.windows(2).filter(|w| w[1].is_nan() || w[1] < w[0] - tolerance).count()
 }
 
-/// Colours that a map does not bring to numbers of at least 0: NaN, infinity, negative ones and the largest of all.
+/// Counts colours that a map brings to no number of at least 0: NaN, negative and huge ones.
 pub fn bad_colours(map: impl Fn([f32; 3]) -> [f32; 3]) -> usize {
     let hard = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, 1e-40, 1.0, 1e30, f32::MAX];
     let mut bad = 0;

@@ -1,7 +1,7 @@
-//! A single hot pixel through every filter, of stills and of frames. Part of section 8, [`super::display`].
+//! A single hot pixel through every filter. Part of section 8, [`super::display`].
 //!
-//! A filter averages: what it makes of a pixel that is far brighter than the others is nowhere brighter than that pixel was nor darker than the others were, no farther away than
-//! the filter reaches, and a number, up to the radiance at which a sample counts as infinite.
+//! A filter averages: nothing it makes is brighter than the hot pixel was or darker than the others
+//! were, farther away than it reaches, or no number, up to the radiance that counts as infinite.
 
 use glam::{DAffine3, DVec3};
 
@@ -21,7 +21,7 @@ use crate::scene::builtin::{SceneTransform, analytic, shapes};
 use crate::scene::{Camera, Light, LightKind, Scene};
 use crate::tracer::{Tracer, TracerKind};
 
-/// Radiance of hot pixels beside one of [`COLD`]: what a firefly has, and nearly what counts as infinite.
+/// Radiance of hot pixels beside one of [`COLD`]: a firefly's, and nearly what counts as infinite.
 pub const HOT: [f32; 3] = [1e3, 1e10, 4e29];
 /// Radiance of the other pixels of a still.
 pub const COLD: f32 = 0.25;
@@ -31,7 +31,7 @@ const NOISE: f32 = 0.01;
 const SIZE: u32 = 33;
 /// Samples of a pixel beside a glint ([`beside_glint`]).
 pub const GLINT_SAMPLES: u32 = 1024;
-/// Those that are bright.
+/// Bright samples among them.
 pub const GLINT_HITS: u32 = 16;
 /// By what share every second pixel is brighter, where they have detail.
 pub const GLINT_DETAIL: f32 = 0.5;
@@ -41,12 +41,11 @@ const RARE_SAMPLES: u32 = 64;
 const RARE_SHARE: f64 = 0.5;
 /// Frames in which the camera moves before it rests.
 const MOVES: u32 = 6;
-/// Albedo of the floors.
 const ALBEDO: f32 = 0.5;
 /// Rounding, relative to the hot pixel or to the others.
 const ROUNDING: f32 = 1e-4;
 
-/// What became of a hot pixel.
+/// The traces of a hot pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
     /// Values that are no numbers, brighter than the hot pixel or darker than the others.
@@ -59,7 +58,7 @@ pub struct Spread {
 
 impl Spread {
     /// Counts an image of which pixel `k` is beyond reach where `is_far(k)`.
-    pub fn of(image: &[f32], cold: f32, hot: f32, is_far: impl Fn(usize) -> bool) -> Self {
+    pub fn measure(image: &[f32], cold: f32, hot: f32, is_far: impl Fn(usize) -> bool) -> Self {
         let mut out = Self::default();
         for (k, pixel) in image.chunks(3).enumerate() {
             for &value in pixel {
@@ -86,8 +85,8 @@ fn reach(filter: &Filter) -> u32 {
     filter.steps().iter().map(|s| s.radius * s.stride).sum()
 }
 
-/// A film of [`COLD`] with one hot pixel in its middle. With noise, a variance is that of a pixel of which one sample is all there is, as films have it: that of the
-/// hottest overflows.
+/// A film of [`COLD`] with one hot pixel in its middle. With noise, a variance is that of a pixel
+/// with a single bright sample: that of the hottest overflows.
 pub fn film(size: u32, hot: f32, noisy: bool) -> Film {
     film_of(size, 16, 1, hot, noisy)
 }
@@ -110,25 +109,19 @@ fn film_of(size: u32, spp: u32, hits: u32, hot: f32, noisy: bool) -> Film {
     film
 }
 
-/// What a still's filter makes of a film with a hot pixel.
-///
-/// # Errors
-/// Those of rendering and filtering.
+/// Applies a still's filter to a film with a hot pixel.
 pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, noisy: bool, watch: &mut Watch) -> Result<Spread> {
     let image = filtered(setup, kind, filter, &film(SIZE, hot, noisy), watch)?;
     let settings = denoise::Settings { kind: filter, ..Default::default() };
     // non-local means follow
     let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX }).max(NLMEANS_RADIUS);
     let is_far = |k: usize| [k as u32 % SIZE, k as u32 / SIZE].into_iter().any(|x| x.abs_diff(SIZE / 2) > reach);
-    Ok(Spread::of(&image, COLD, hot, is_far))
+    Ok(Spread::measure(&image, COLD, hot, is_far))
 }
 
-/// How far a still's filter moves pixels of [`GLINT_SAMPLES`], which know their radiance well, towards a glint a thousand times as bright, which `hits` of its samples have: the farthest, in
-/// standard errors of its own. An image at rest in front of the sun has such pixels. (If one sample had it, any of the others might be as bright as often.) Every second pixel is brighter by
-/// the share `detail`: a texture, which the glint's noise must not blur.
-///
-/// # Errors
-/// Those of rendering and filtering.
+/// Farthest move of pixels of [`GLINT_SAMPLES`], which know their radiance, towards a glint a
+/// thousand times as bright in `hits` of its samples, in its standard errors. Pixels of the sun are
+/// such. Every second pixel is brighter by the share `detail`: a texture, not to be blurred.
 pub fn beside_glint(
     setup: &Setup,
     kind: TracerKind,
@@ -152,11 +145,9 @@ pub fn beside_glint(
     Ok(worst / f64::from(NOISE / spp as f32).sqrt())
 }
 
-/// How much a still's filter lowers the error of rare light: the error after it over that before, roots of mean squares. Half of the pixels, chosen at random, have met light in one of their
-/// [`RARE_SAMPLES`]. The samples of the others, which might have met it as often, are all alike, which is no reason to keep them. The film says `noise` times the variance that samples have.
-///
-/// # Errors
-/// Those of rendering and filtering.
+/// Error of rare light after a still's filter over that before, root mean squares. A random half of
+/// the pixels have met light in one of [`RARE_SAMPLES`]. The others' samples are all alike, which
+/// is no reason to keep them. The film says `noise` times the variance of samples.
 pub fn rare_light(setup: &Setup, kind: TracerKind, filter: FilterKind, noise: f32, watch: &mut Watch) -> Result<f64> {
     let mut film = Film::new(SIZE, SIZE, 3);
     film.samples.fill(RARE_SAMPLES);
@@ -197,7 +188,7 @@ pub fn check_beside_glint(name: &str, moved: f64) -> Check {
         .says(format!("pixels of {GLINT_SAMPLES} samples beside one that has its radiance from {GLINT_HITS}"))
 }
 
-/// A dark floor of which a spotlight lights a circle, less than a pixel of [`frames`] large, to the radiance `hot`.
+/// A dark floor with a spot less than a pixel of [`frames`] large, lit to the radiance `hot`.
 pub fn spotlit(hot: f32) -> (Scene, f64) {
     let (height, radius) = (5.0, 0.1f64);
     let camera = Camera::look_at(DVec3::new(0.0, 10.0, 0.0), DVec3::ZERO, DVec3::Z, 0.6);
@@ -215,19 +206,14 @@ pub fn spotlit(hot: f32) -> (Scene, f64) {
     (scene, radius)
 }
 
-/// What the filters of frames make of a spot less than a pixel large while the camera moves: the sum of what became of it in all frames, whose `total` is of the last.
-///
-/// # Errors
-/// Those of the frames.
+/// The traces of a spot less than a pixel large in filtered frames while the camera moves: sums
+/// over all frames, with the last frame's `total`.
 pub fn frames(setup: &Setup, kind: TracerKind, settings: &Settings, hot: f32, frames: u32) -> Result<Spread> {
     let (scene, radius) = spotlit(hot);
     frames_of(setup, kind, &scene, radius, settings, hot, frames)
 }
 
 /// See [`frames`]: those of a scene of [`spotlit`].
-///
-/// # Errors
-/// Those of the frames.
 pub fn frames_of(
     setup: &Setup,
     kind: TracerKind,
@@ -244,7 +230,7 @@ pub fn frames_of(
     let mut realtime = Realtime::radiance(&tracer, &flat, size, settings, &options)?;
     let spot = scene.lights[0].position - flat.origin;
     let footprint: f64 = 2.0 * 10.0 * 0.3f64.tan() / f64::from(size[1]);
-    // the spot's own pixel and, in every frame in which the camera moves, a tap between two pixels of the frame before
+    // the spot's own pixel and, for each moving frame, a tap between two pixels of the frame before
     let limit = radius + footprint * f64::from(reach(&settings.filter) + 2 + MOVES);
     let mut out = Spread::default();
     for frame in 0..frames {
@@ -261,7 +247,7 @@ pub fn frames_of(
             })
         };
         // a sample in the circle may be all of a pixel's
-        let now = Spread::of(&realtime.result()?, 0.0, hot, is_far);
+        let now = Spread::measure(&realtime.result()?, 0.0, hot, is_far);
         out = Spread { unsound: out.unsound + now.unsound, far: out.far + now.far, total: now.total };
     }
     Ok(out)
@@ -270,10 +256,8 @@ pub fn frames_of(
 /// Side of the sheet of [`rare_occlusion`] that occludes one sample in a hundred.
 pub const SHEET: f64 = 1.1;
 
-/// Occlusion, a sum over pixels and frames, of a floor under a far sheet with sides of `side` units, in frames without history.
-///
-/// # Errors
-/// Those of the frames.
+/// Occlusion, summed over pixels and frames without history, of a floor under a sheet of side
+/// `side`.
 pub fn rare_occlusion(setup: &Setup, kind: TracerKind, settings: &Settings, side: f64, frames: u32) -> Result<f64> {
     let mut scene = analytic::plane(20.0, SceneTransform::default());
     sampling::add(&mut scene, shapes::rectangle(DVec3::Y * 6.0, DVec3::X * side, DVec3::Z * side), emitter(0.0));
@@ -291,23 +275,19 @@ pub fn rare_occlusion(setup: &Setup, kind: TracerKind, settings: &Settings, side
     Ok(sum)
 }
 
-/// The check of the occlusion of filtered frames beside that of the same frames without a filter, by [`rare_occlusion`]: a filter keeps the mean.
+/// The check of filtered occlusion against unfiltered, by [`rare_occlusion`]: means stay.
 pub fn check_rare_occlusion(name: &str, filtered: f64, unfiltered: f64) -> Check {
     let ratio = filtered / unfiltered;
     Check::at_most(name, (ratio - 1.0).abs(), "of its occlusion", 0.02)
         .says(format!("{ratio:.3} of the occlusion that frames without a filter have"))
 }
 
-/// The checks of the section.
-///
-/// # Errors
-/// Those of [`Session::measure_all`].
 pub(super) fn run(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
     for filter in [FilterKind::Box, FilterKind::Atrous] {
         for hot in HOT {
-            for (noisy, how) in [(true, "noisy"), (false, "without noise")] {
-                let name = format!("{filter} filter of a still with one pixel of {hot:e}, {how}");
+            for (noisy, noise) in [(true, "noisy"), (false, "without noise")] {
+                let name = format!("{filter} filter of a still with one pixel of {hot:e}, {noise}");
                 session.measure_each(&name, &kinds, |s, kind, w| Ok(still(s, kind, filter, hot, noisy, w)?.check(&name)))?;
             }
         }

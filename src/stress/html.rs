@@ -7,9 +7,6 @@ use crate::error::Result;
 use crate::report::{self, Cell, Page, Part, Row, Section, Status, Table};
 
 /// Writes the page into a folder, and returns its path. `command`: the command that was typed.
-///
-/// # Errors
-/// [`crate::Error::Output`].
 pub fn write(summary: &Summary, command: &str, dir: &Path) -> Result<PathBuf> {
     let mut sections = Vec::new();
     let failures: Vec<&Check> = summary.failures().collect();

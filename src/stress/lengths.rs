@@ -1,5 +1,6 @@
-//! Lengths of different orders: walls and boxes that are up to ten million times as long as what is near them. Their faces stand on one another without common vertices, as in
-//! files of cities, roads and buildings. Edge functions and distances round in proportion to the far corners, while what is seen is the near part.
+//! Walls and boxes up to ten million times as long as what is near them. Their faces stand on one
+//! another without common vertices, as in files of cities, roads and buildings. Edge functions and
+//! distances round in proportion to the far corners, while the near part is seen.
 
 use glam::{DQuat, DVec3};
 
@@ -14,7 +15,6 @@ use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Scene, TriangleMesh};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "lengths",
     title: "Lengths of different orders",
@@ -28,7 +28,7 @@ const LENGTHS: [f64; 7] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
 /// Height of [`Kerb`] over the distance of the point that sees it.
 const HEIGHT: f64 = 15.0;
 
-/// A square floor, and on it a wall as long as the floor, seen from a point at distance 1 from the wall.
+/// A square floor and a wall of its length, seen from a point at distance 1 from the wall.
 pub struct Kerb {
     /// The scene; its vertices are where single precision puts them.
     pub scene: Scene,
@@ -39,7 +39,7 @@ pub struct Kerb {
 }
 
 impl Kerb {
-    /// `along`: where along the wall the point is, from -1 to 1; `turn`: a rotation of vertices and camera.
+    /// `along`: the place along the wall, from -1 to 1; `turn`: a rotation of vertices and camera.
     pub fn new(length: f64, along: f64, turn: DQuat) -> Self {
         let half = 0.5 * length;
         let floor = shapes::floor(DVec3::ZERO, length);
@@ -60,9 +60,6 @@ impl Kerb {
     }
 
     /// The image's bias.
-    ///
-    /// # Errors
-    /// Those of rendering.
     pub fn bias(&self, tracer: &Tracer, spp: u32, watch: &mut dyn crate::film::Control) -> Result<closed_forms::Bias> {
         let case = Case {
             what: "kerb",
@@ -88,7 +85,7 @@ impl Kerb {
                 let target = foot + right * (random(i, 0) - 0.5) * 8.0 + up * (0.1 + 0.8 * random(i, 1)) * HEIGHT;
                 let ray = ray(origin, (target - origin).normalize());
                 let direction = DVec3::from_array(ray.direction.map(f64::from));
-                // of the first triangle's plane, or the second's: vertices that are rounded leave two
+                // of the first triangle's plane, or the second's: rounded vertices have two
                 let meet = |t: &[DVec3; 3]| {
                     let normal = (t[1] - t[0]).cross(t[2] - t[0]);
                     origin + direction * ((t[0] - origin).dot(normal) / direction.dot(normal))
@@ -103,10 +100,8 @@ impl Kerb {
             .collect()
     }
 
-    /// Largest errors of the distance and of the point between the corners of hits at the near part of the wall, in shares of the distance; misses count 1.
-    ///
-    /// # Errors
-    /// Those of tracing.
+    /// Largest errors of the distance and of the point between corners at the near part of the
+    /// wall, in shares of the distance; misses count 1.
     pub fn errors(&self, tracer: &Tracer, count: u32, watch: &mut dyn crate::film::Control) -> Result<[f64; 2]> {
         let expected = self.rays(count);
         let rays: Vec<Ray> = expected.iter().map(|e| e.0).collect();
@@ -146,8 +141,8 @@ fn triangles(geometry: &Geometry) -> Vec<[DVec3; 3]> {
     }
 }
 
-/// A closed box with a square cross-section of side 2 along x, whose camera is inside. Where it is `split`, each long side is made of quads of other lengths, so that edges of one lie within
-/// edges of the next.
+/// A closed box along x with a square cross-section of side 2 around the camera. `split`: long
+/// sides have uneven quads, so that edges of one lie within edges of the next.
 pub fn long_box(length: f64, split: bool, turn: DQuat) -> Scene {
     let half = 0.5 * length;
     let mut quads = Vec::new();
@@ -158,10 +153,7 @@ pub fn long_box(length: f64, split: bool, turn: DQuat) -> Scene {
             let p = about * DVec3::new(0.0, -1.0, z);
             DVec3::new(x, p.y.round(), p.z.round())
         };
-        let cuts = match split {
-            true => vec![-half, half * (0.31 + 0.1 * f64::from(side)), half],
-            false => vec![-half, half],
-        };
+        let cuts = if split { vec![-half, half * (0.31 + 0.1 * f64::from(side)), half] } else { vec![-half, half] };
         quads.extend(cuts.windows(2).map(|x| [at(x[0], -1.0), at(x[0], 1.0), at(x[1], 1.0), at(x[1], -1.0)]));
     }
     let cap = |x: f64| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[y, z]| DVec3::new(x, y, z));
@@ -172,7 +164,8 @@ pub fn long_box(length: f64, split: bool, turn: DQuat) -> Scene {
     scene
 }
 
-/// Largest error of a hit of the compute tracer, as a share of the distance: what shaders/trace/triangle.glsl lets pass, and the 24 bits of a weight.
+/// Largest relative error of the compute tracer's hits: of trace/triangle.glsl, and of a weight's
+/// 24 bits.
 pub fn hit_bound(length: f64) -> f64 {
     1.0 / 64.0 + 1e-7 * length
 }
@@ -210,20 +203,20 @@ fn check_hits(setup: &Setup, kind: TracerKind, name: &str, kerb: &Kerb, length: 
 fn run(session: &mut Session) -> Result<()> {
     let kinds = session.setup().tracers();
     for (k, length) in LENGTHS.into_iter().enumerate() {
-        for (how, turn) in turns().into_iter().filter(|t| can_turn(length, t.1)) {
+        for (orientation, turn) in turns().into_iter().filter(|t| can_turn(length, t.1)) {
             let along = if k.is_multiple_of(2) { 0.0 } else { 0.37 };
             let kerb = Kerb::new(length, along, turn);
-            let name = format!("a wall on a floor, length {length:e}, {how}");
+            let name = format!("a wall on a floor, length {length:e}, {orientation}");
             // beyond, rays start off the floor at a height that matters beside the wall's
             session.measure_each(&name, &kinds, |s, kind, w| Ok(held(check_kerb(s, kind, &name, &kerb, w)?, length <= 1e6)))?;
-            let name = format!("hits of a wall, length {length:e}, {how}");
+            let name = format!("hits of a wall, length {length:e}, {orientation}");
             session.measure_each(&name, &kinds, |s, kind, w| check_hits(s, kind, &name, &kerb, length, w))?;
             for (what, split) in [("box", false), ("box of uneven quads", true)] {
-                let name = format!("{what} is dark, length {length:e}, {how}");
+                let name = format!("{what} is dark, length {length:e}, {orientation}");
                 let scene = long_box(length, split, turn);
                 session.measure_each(&name, &kinds, |s, kind, w| {
                     let check = super::scale::check_exact(s, kind, &name, &scene, 0.0, w)?;
-                    // beyond, where rays start and where edges are is rounded to a thousandth of the box's width and more
+                    // beyond, ray origins and edges are rounded to a thousandth of the box's width
                     Ok(held(check, length <= 1e3))
                 })?;
             }

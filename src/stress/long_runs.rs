@@ -1,4 +1,5 @@
-//! Section 7, long runs: films of very many samples, films that are stopped and resumed, histories of many frames, and counters ([`super::counters`]).
+//! Section 7, long runs: films of very many samples, stopped and resumed films, histories of many
+//! frames, and counters ([`super::counters`]).
 
 use std::sync::Arc;
 
@@ -21,7 +22,6 @@ use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
 use crate::scene::{Camera, Environment, Instance, Mesh, Scene};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "long-runs",
     title: "Long runs",
@@ -36,7 +36,7 @@ const DRIFT: f64 = 1e-6;
 /// Radiance of the environment of [`constant`].
 pub(super) const RADIANCE: [f32; 3] = [0.1, 0.7, 3.3];
 
-/// Pixels that see the same all the time, a radiance that single precision forgets most of when it is added often.
+/// Constant pixels, of a radiance that single precision forgets most of when it is added often.
 pub fn constant() -> Scene {
     let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 0.9);
     let behind = shapes::sphere(DVec3::Z * 5.0, 1.0);
@@ -48,7 +48,7 @@ fn up_to(options: &PathOptions, spp: u32, start: Option<FilmState>) -> PathOptio
     options.clone().with_samples(|s| (s.spp, s.film) = (spp, film))
 }
 
-/// Largest relative distance of a film of [`constant`] from the radiance that it saw, and the same of a plain f32 sum.
+/// Largest relative error of a film of [`constant`], and that of a plain f32 sum.
 pub fn drift(image: &Accumulated) -> (f64, f64) {
     let off = |value: f64, truth: f32| (value / f64::from(truth) - 1.0).abs();
     let (mut worst, mut naive) = (0.0f64, 0.0f64);
@@ -68,10 +68,8 @@ pub fn different_words(a: &FilmState, b: &FilmState) -> usize {
         + a.samples_plane().iter().zip(b.samples_plane()).filter(|(a, b)| **a != *b).count()
 }
 
-/// Pixels of frames of a scene whose ambient visibility is `value` everywhere that are something else, and how many were seen. The camera moves by `step` in every frame.
-///
-/// # Errors
-/// Those of the frames.
+/// Counts pixels of frames that differ from a scene's constant ambient visibility `value`, and all
+/// seen. The camera moves by `step` in every frame.
 pub fn frames_off(
     tracer: &Tracer,
     scene: &Scene,
@@ -87,7 +85,7 @@ pub fn frames_off(
     })
 }
 
-/// A floor and, below it, a closed box, with a camera of each and the ambient visibility that it sees.
+/// A floor above a closed box, with a camera of each and the ambient visibility that it sees.
 pub fn open_and_closed() -> (Scene, [(Camera, f32); 2]) {
     let mut scene = analytic::plane(20.0, SceneTransform::default());
     let closed = analytic::closed_box(2.0, SceneTransform { scale: 1.0, offset: DVec3::Y * -10.0 });
@@ -100,9 +98,6 @@ pub fn open_and_closed() -> (Scene, [(Camera, f32); 2]) {
 }
 
 /// As [`frames_off`], of frames each of which has a camera and an ambient visibility of its own.
-///
-/// # Errors
-/// Those of the frames.
 pub fn views_off(
     tracer: &Tracer,
     scene: &Scene,

@@ -1,7 +1,8 @@
-//! The numerical stress suite: checks that try to break tracers, sampling, films and filters, on built-in scenes or on a scene of the user's.
+//! The numerical stress suite: checks that try to break tracers, sampling, films and filters, on
+//! built-in scenes or on a scene of the user's.
 //!
-//! [`SECTIONS`] is the only list of sections, a file each; the command line, reports and tests reach them through it. A section measures figures and holds each against
-//! a bound: that is a [`Check`]. What is measured is in functions that tests call too, with scenes and answers that are wrong on purpose.
+//! [`SECTIONS`] is the only list of sections, a file each. A [`Check`] is a measured figure with a
+//! bound. Tests call the same functions with wrong scenes and answers.
 //!
 //! ```no_run
 //! use skylit::stress::{self, Options, Quiet};
@@ -65,29 +66,21 @@ pub static SECTIONS: &[Section] = &[
     determinism::SECTION,
 ];
 
-/// All checks of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// [`SCHEMA`].
     pub schema: u32,
     /// The scene, if it was one of the user's.
     pub scene: Option<String>,
-    /// How much was traced.
     pub effort: Effort,
-    /// The device.
     pub device: String,
-    /// Its driver.
     pub driver: String,
-    /// The checks, in order.
     pub checks: Vec<Check>,
     /// Warnings of the scene's loader, a sentence each.
     pub warnings: Vec<String>,
-    /// Seconds of all.
     pub seconds: f64,
 }
 
 impl Summary {
-    /// The checks that fail.
     pub fn failures(&self) -> impl Iterator<Item = &Check> {
         self.checks.iter().filter(|c| c.verdict == Verdict::Fails)
     }
@@ -115,7 +108,8 @@ impl Summary {
 /// Runs the sections that options name.
 ///
 /// # Errors
-/// [`Error::Usage`] for a section that does not exist or that is about the other kind of scene, and where no check has a name that is wanted; those of loading the scene and opening the device; interruption.
+/// [`Error::Usage`] for a section that does not exist or is about the other kind of scene, or no
+/// check of a wanted name; errors of the scene and the device; interruption.
 pub fn run(options: &Options, settings: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
     let start = Instant::now();
     let sections = sections(options)?;
@@ -154,9 +148,10 @@ fn sections(options: &Options) -> Result<Vec<&'static Section>> {
             return Err(Error::Usage(format!("--sections: there is no section '{name}'; there are {}", names.join(", "))));
         };
         if section.of_scene != about_scene {
-            return Err(Error::Usage(match about_scene {
-                true => format!("--sections {name}: it is about built-in scenes: leave SCENE out"),
-                false => format!("--sections {name}: it is about a scene of yours: name one"),
+            return Err(Error::Usage(if about_scene {
+                format!("--sections {name}: it is about built-in scenes: leave SCENE out")
+            } else {
+                format!("--sections {name}: it is about a scene of yours: name one")
             }));
         }
     }
@@ -204,7 +199,9 @@ mod tests {
         };
         let good = [Check::at_most("a", 0.0, "", 1.0), Check::reported("b", 9.0, ""), Check::not_applicable("c", "no")];
         assert!(summary(good.to_vec()).verdict().is_ok());
-        let bad = summary(vec![Check::at_most("leaks of a box", 2.0, "", 0.0).of(TracerKind::Compute)]).verdict().unwrap_err();
+        let bad = summary(vec![Check { tracer: Some(TracerKind::Compute), ..Check::at_most("leaks of a box", 2.0, "", 0.0) }])
+            .verdict()
+            .unwrap_err();
         assert_eq!((bad.exit_code(), bad.to_string().as_str()), (1, "1 check fails: leaks of a box (compute)"));
     }
 }

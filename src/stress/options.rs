@@ -25,12 +25,10 @@ impl Effort {
     }
 }
 
-/// Options of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// A file or `builtin:NAME` that is examined; `None`: the built-in scenes of the suite.
     pub scene: Option<String>,
-    /// The amount of rays that are traced.
     pub effort: Effort,
     /// Names of the sections that run; empty: all.
     pub sections: Vec<String>,

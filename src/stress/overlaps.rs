@@ -1,4 +1,4 @@
-//! Surfaces that lie on one another in one plane, all of a triangle or a part of it: which of them a ray meets, rounding decides. Part of [`super::scene`].
+//! Surfaces in one plane: rounding decides which a ray meets. Part of [`super::scene`].
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,12 +11,11 @@ const PARALLEL: f64 = 1.0 - 1e-6;
 /// Roundings of the largest coordinate within which two surfaces are one to a tracer.
 const ROUNDINGS: f64 = 4.0;
 
-/// What points of a scene's triangles, spread evenly over their area, lie on.
+/// Points of a scene's triangles, spread evenly over their area, and the surfaces under them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overlaps {
-    /// Points.
     pub points: u64,
-    /// Those at which another triangle lies in the same plane within a rounding, but not at its own edge.
+    /// Points in the plane of another triangle within a rounding, but not at its edge.
     pub covered: u64,
     /// Instance and primitive of two triangles of which one lies on the other.
     pub example: Option<[(u32, u32); 2]>,
@@ -24,7 +23,7 @@ pub struct Overlaps {
 
 impl Overlaps {
     /// Looks at `count` points.
-    pub fn of(oracle: &Oracle, count: u32, seed: u32) -> Self {
+    pub fn measure(oracle: &Oracle, count: u32, seed: u32) -> Self {
         let triangles = oracle.triangles();
         let mut total = 0.0;
         let areas: Vec<f64> = triangles
@@ -78,35 +77,35 @@ mod tests {
     use crate::scene::builtin::{SceneTransform, analytic, shapes};
     use crate::stress::sampling::{add, matte};
 
-    fn of(scene: &Scene) -> Overlaps {
-        Overlaps::of(&Oracle::new(scene, scene.origin()), 20_000, 3)
+    fn overlaps(scene: &Scene) -> Overlaps {
+        Overlaps::measure(&Oracle::new(scene, scene.origin()), 20_000, 3)
     }
 
-    /// A square over a quarter of another one's area, an eighth of a sheet over a plane, and nothing on a closed body or a grid of squares.
+    /// A square over a quarter of another one, an eighth of a sheet over a plane, and sound scenes.
     #[test]
     fn overlaps_are_found_where_they_are() {
         for at in [SceneTransform::default(), SceneTransform { scale: 1e-3, offset: DVec3::splat(1e6) }] {
             let plane = analytic::plane(2.0, at);
-            assert_eq!(of(&plane).covered, 0);
+            assert_eq!(overlaps(&plane).covered, 0);
             let mut both = plane.clone();
-            // its middle is a corner of the plane: a quarter of it lies on the plane, and is a quarter of that
+            // its middle is a corner of the plane: a quarter of it lies on a quarter of the plane
             let mut second = plane.instances[0].clone();
             second.object_to_world *= glam::DAffine3::from_translation(DVec3::new(1.0, 0.0, 1.0));
             both.instances.push(second.clone());
-            let found = of(&both);
+            let found = overlaps(&both);
             let share = found.covered as f64 / found.points as f64;
             assert!((share - 0.25).abs() < 0.01, "{share}");
             assert_eq!(found.example.map(|e| e.map(|(instance, _)| instance)), Some([0, 1]));
             // a thousandth apart is apart
             both.instances[1].object_to_world *= glam::DAffine3::from_translation(DVec3::Y * 1e-3);
-            assert_eq!(of(&both).covered, 0, "{at:?}");
+            assert_eq!(overlaps(&both).covered, 0, "{at:?}");
         }
-        assert_eq!(of(&analytic::closed_box(1.0, SceneTransform::default())).covered, 0);
+        assert_eq!(overlaps(&analytic::closed_box(1.0, SceneTransform::default())).covered, 0);
         let mut grid = Scene::default();
         for k in 0..16 {
             let middle = DVec3::new(f64::from(k % 4), 0.0, f64::from(k / 4));
             add(&mut grid, shapes::floor(middle, 1.0), matte(0.5));
         }
-        assert_eq!(of(&grid).covered, 0);
+        assert_eq!(overlaps(&grid).covered, 0);
     }
 }

@@ -1,5 +1,5 @@
-//! Section 6, sampling: furnaces over roughness, extreme environment maps and lights. No sample may be NaN or infinite: the film counts those on the device and rejects them,
-//! in every render.
+//! Section 6, sampling: furnaces over roughness, extreme environment maps and lights. No sample may
+//! be NaN or infinite: the film counts those and rejects them, in every render.
 
 use std::sync::Arc;
 
@@ -18,7 +18,6 @@ use crate::scene::material::MaterialKind;
 use crate::scene::{Camera, Environment, EnvironmentMap, Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "sampling",
     title: "Sampling",
@@ -67,7 +66,7 @@ pub fn furnace(scale: f64, material: Material) -> Scene {
     }
 }
 
-/// Mean over all pixels and channels, and its true standard error: pixels draw their samples independently of each other.
+/// Mean over all pixels and channels, and its standard error from independent pixels.
 pub fn mean_of(film: &Film) -> (f64, f64) {
     let means: Vec<f64> = film.mean.chunks(3).map(|p| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).collect();
     let n = means.len() as f64;
@@ -77,9 +76,6 @@ pub fn mean_of(film: &Film) -> (f64, f64) {
 }
 
 /// Path-traces a scene through its first camera.
-///
-/// # Errors
-/// Those of rendering.
 pub fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, watch: &mut Watch) -> Result<PathResult> {
     let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     path::render(tracer, flat, &CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect), options, watch)
@@ -88,10 +84,7 @@ pub fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, watch: &
 /// Standard errors within which noise alone leaves an image's mean.
 const ERRORS: f64 = 4.5;
 
-/// The check of an image whose mean is known: how far off it is, beside noise and a relative `rounding`. A sample that is not finite fails it.
-///
-/// # Errors
-/// Those of rendering.
+/// The check of an image of known mean, within noise and a relative `rounding`, of finite samples.
 #[expect(clippy::too_many_arguments, reason = "a case is all of these")]
 pub fn check_mean(
     setup: &Setup,
@@ -130,8 +123,8 @@ pub fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environm
     Environment::Map(EnvironmentMap { name: "map".into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY })
 }
 
-/// Mean radiance of [`furnace`] with white plastic as smooth as a mirror, in `size` by `size` pixels, by quadrature in f64: the Fresnel term of the surface, and of the diffuse base
-/// what that term leaves of each direction (glTF 2.0, appendix B). The model gains at grazing angles.
+/// Mean radiance of [`furnace`] with white plastic as smooth as a mirror, in `size` by `size`
+/// pixels, by quadrature in f64 (glTF 2.0, appendix B). The model gains at grazing angles.
 pub fn smooth_plastic_furnace(size: u32) -> f64 {
     let fresnel = |cos: f64| 0.04 + 0.96 * (1.0 - cos).powi(5);
     let albedo = |cos_o: f64| {
@@ -162,7 +155,8 @@ fn run(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
     let options = |spp: u32| PathOptions { samples: SampleSettings::new([16, 16], spp, 3), ..Default::default() };
     let (few, many) = (effort.pick(16, 1024), effort.pick(64, 16_384));
-    // what conserves energy
+
+    // Mirrors and glass conserve energy.
     let mirror = Material { kind: MaterialKind::Mirror, specular_color: Vec3::ONE, ..Material::default() };
     let mut exact = vec![("mirror".to_owned(), mirror, few)];
     exact.extend([1.33, 1.5, 2.4].map(|ior| (format!("glass, index {ior}"), glass(0.0, ior), many)));
@@ -170,7 +164,8 @@ fn run(session: &mut Session) -> Result<()> {
         let (name, scene) = (format!("furnace, {what}"), furnace(1.0, material));
         session.measure_each(&name, &kinds, |s, kind, w| check_mean(s, kind, &name, &scene, &options(spp), 1.0, 2e-6, w))?;
     }
-    // what is nearly smooth has a closed form
+
+    // Nearly smooth plastic has a closed form.
     let smooth = smooth_plastic_furnace(16);
     for roughness in [1e-4f32, 1e-3, 1e-2] {
         let name = format!("furnace, plastic of roughness {roughness:e}");
@@ -178,7 +173,8 @@ fn run(session: &mut Session) -> Result<()> {
         session
             .measure_each(&name, &kinds, |s, kind, w| check_mean(s, kind, &name, &scene, &options(many), smooth, 1e-3, w))?;
     }
-    // what loses some of it between microfacets; a diffuse base under a coat of glTF's model gains at grazing angles, as the model has it
+
+    // Rough metal loses light between microfacets; glTF's coated plastic gains at grazing angles.
     for roughness in [1e-4f32, 1e-3, 1e-2, 0.1, 0.5, 1.0] {
         for (metal, metallic, most) in [("metal", 1.0f32, 1.0), ("plastic", 0.0, smooth)] {
             if metallic == 0.0 && roughness < 0.1 {

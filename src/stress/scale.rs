@@ -1,5 +1,5 @@
-//! Section 1, scale and place: closed forms of ambient occlusion and direct light, and furnaces, from 1e-6 to 1e6 units, up to 1e7 units from the origin, through mirrored,
-//! sheared and non-uniform transforms.
+//! Section 1, scale and place: closed forms and furnaces from 1e-6 to 1e6 units, up to 1e7 from the
+//! origin, through mirrored, sheared and non-uniform transforms.
 
 use base64::Engine as _;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
@@ -16,7 +16,6 @@ use crate::scene::builtin::{self, SceneTransform, analytic};
 use crate::scene::{Camera, Geometry, Scene, load};
 use crate::tracer::{Needs, Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "scale",
     title: "Scale and place",
@@ -48,7 +47,7 @@ pub fn places() -> Vec<SceneTransform> {
     .to_vec()
 }
 
-/// Whether single precision has the digits for a scene whose vertices are at this place in the world.
+/// Has single precision the digits for a scene whose vertices are at this place in the world?
 pub fn can_bake(place: &SceneTransform) -> bool {
     place.offset.abs().max_element() <= 1e6 * place.scale
 }
@@ -65,7 +64,7 @@ pub fn linear_maps() -> Vec<(&'static str, DMat3)> {
     ]
 }
 
-/// The same scene in the world, but for rounding, with `map` in the transforms of its triangle meshes and its inverse in their vertices.
+/// A scene with `map` in the transforms of its triangle meshes and its inverse in their vertices.
 pub fn through(scene: &Scene, map: &DMat3) -> Scene {
     let mut out = scene.clone();
     let (inverse, mirrors, map) = (map.inverse(), map.determinant() < 0.0, DAffine3::from_mat3(*map));
@@ -92,9 +91,7 @@ type Surface = Box<dyn Fn(&OracleRay) -> Option<DVec3>>;
 
 /// A closed form at a place.
 pub struct PlacedForm {
-    /// Name of the closed form.
     pub what: &'static str,
-    /// The scene.
     pub scene: Scene,
     camera: Camera,
     surface: Surface,
@@ -102,7 +99,6 @@ pub struct PlacedForm {
 }
 
 impl PlacedForm {
-    /// It as a case of an image.
     pub fn case(&self, size: u32, spp: u32) -> Case<'_> {
         Case {
             what: self.what,
@@ -126,6 +122,8 @@ pub fn closed_forms_at(place: SceneTransform) -> Vec<PlacedForm> {
     let (radius, height) = (1.0, 1.25);
     let ball = analytic::sphere_over_plane(radius, height, 60.0, place);
     let gap = 1.0;
+
+    // Each closed form knows the solid angle that is free at a point of its surface.
     vec![
         PlacedForm {
             what: "groove of 90 degrees",
@@ -160,7 +158,7 @@ pub fn closed_forms_at(place: SceneTransform) -> Vec<PlacedForm> {
     ]
 }
 
-/// The floor's point that a ray meets, if it passes the sphere of [`analytic::sphere_over_plane`] by at least a twentieth of its radius.
+/// The floor's point that a ray meets, if it passes the sphere well (a twentieth of its radius).
 pub fn floor_beside_sphere(ray: &OracleRay, place: SceneTransform, radius: f64, height: f64) -> Option<DVec3> {
     let hit = on_plane(ray, place.offset, DVec3::Y)?;
     let local = (hit - place.offset) / place.scale;
@@ -170,9 +168,6 @@ pub fn floor_beside_sphere(ray: &OracleRay, place: SceneTransform, radius: f64, 
 }
 
 /// Bias of a closed form's image by one tracer.
-///
-/// # Errors
-/// Those of rendering.
 pub fn check_form(
     setup: &Setup,
     kind: TracerKind,
@@ -192,11 +187,8 @@ pub fn check_form(
     Ok(Check::at_most(name, value, "of visibility", bound).says(sentence))
 }
 
-/// Samples of a scene in which all have the value `want` that have another one: 0 on the compute tracer. Where they are rays that leave a closed box, others may lose one in
-/// 100,000, which is their driver's affair.
-///
-/// # Errors
-/// Those of rendering.
+/// Samples of a scene whose value is not `want` as it should be: 0 on the compute tracer. Rays that
+/// leave a closed box may lose one in 100,000 on others, which is their driver's affair.
 pub fn check_exact(setup: &Setup, kind: TracerKind, name: &str, scene: &Scene, want: f32, watch: &mut Watch) -> Result<Check> {
     let options = options(setup.effort().pick(48, 192), setup.effort().pick(4, 64), 1.0, f64::INFINITY);
     let image = closed_forms::render(&setup.tracer(kind, scene)?, scene, &scene.cameras[0], &options, watch)?;
@@ -214,7 +206,8 @@ fn place_text(place: &SceneTransform) -> String {
 
 fn run(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
-    // planes are 1 and closed boxes 0
+
+    // Planes are 1 and closed boxes 0, wherever they are.
     for (k, place) in places().into_iter().enumerate() {
         let text = place_text(&place);
         let (plane, closed) = (analytic::plane(10.0, place), analytic::closed_box(2.0, place));
@@ -240,7 +233,8 @@ fn run(session: &mut Session) -> Result<()> {
             session.measure_each(&name, &kinds, |s, kind, w| check_exact(s, kind, &name, &closed, 0.0, w))?;
         }
     }
-    // closed forms that vary
+
+    // Closed forms vary over the image.
     let near = |k: usize| effort.pick(k.is_multiple_of(3) || k == 5, true);
     for (k, place) in places().into_iter().enumerate().filter(|(k, _)| near(*k)) {
         let maps = linear_maps();
@@ -249,8 +243,8 @@ fn run(session: &mut Session) -> Result<()> {
             if let Some((_, map)) = map {
                 form.scene = through(&form.scene, map);
             }
-            let how = map.map_or(String::new(), |(name, _)| format!(", {name}"));
-            let name = format!("{}{how}, {}", form.what, place_text(&place));
+            let suffix = map.map_or(String::new(), |(name, _)| format!(", {name}"));
+            let name = format!("{}{suffix}, {}", form.what, place_text(&place));
             session.measure_each(&name, &kinds, |s, kind, w| check_form(s, kind, &name, &form, effort.pick(256, 4096), w))?;
         }
     }
@@ -258,10 +252,8 @@ fn run(session: &mut Session) -> Result<()> {
     georeferenced(session)
 }
 
-/// A glTF file with two horizontal squares a millimetre apart, 4e6 metres from the origin: in translations of nested nodes, or (`in_vertices`) in positions.
-///
-/// # Errors
-/// [`Error::Output`]; those of the loader.
+/// A glTF file with two horizontal squares a millimetre apart, 4e6 metres from the origin: in
+/// translations of nested nodes, or (`in_vertices`) in positions.
 pub fn georeferenced_scene(in_vertices: bool) -> Result<Scene> {
     let place = [4e6, 3e6, -4e6];
     let [x, y, z] = if in_vertices { place } else { [0.0; 3] };
@@ -276,15 +268,12 @@ pub fn georeferenced_scene(in_vertices: bool) -> Result<Scene> {
     let bytes: Vec<u8> = [bytemuck::cast_slice::<f32, u8>(&corners), bytemuck::cast_slice(&indices)].concat();
     let data = base64::engine::general_purpose::STANDARD.encode(bytes);
     let (lo, hi) = bounds(&corners);
-    let nodes = match in_vertices {
-        true => r#"[{"mesh":0}]"#.to_owned(),
+    let nodes = if in_vertices {
+        r#"[{"mesh":0}]"#.to_owned()
+    } else {
         // half of the way in each of two nested nodes
-        false => format!(
-            r#"[{{"translation":[{0},{1},{2}],"children":[1]}},{{"translation":[{0},{1},{2}],"mesh":0}}]"#,
-            place[0] / 2.0,
-            place[1] / 2.0,
-            place[2] / 2.0
-        ),
+        let [x, y, z] = place.map(|p| p / 2.0);
+        format!(r#"[{{"translation":[{x},{y},{z}],"children":[1]}},{{"translation":[{x},{y},{z}],"mesh":0}}]"#)
     };
     let text = format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":{nodes},
@@ -298,9 +287,6 @@ pub fn georeferenced_scene(in_vertices: bool) -> Result<Scene> {
 }
 
 /// Loads a file of this name with this text.
-///
-/// # Errors
-/// [`Error::Output`]; those of the loader.
 pub(super) fn load_text(name: &str, text: &str) -> Result<Scene> {
     let dir = tempfile::tempdir().map_err(|e| Error::write("a temporary folder", &e))?;
     let file = dir.path().join(name);
@@ -315,9 +301,6 @@ fn bounds(corners: &[f32]) -> ([f32; 3], [f32; 3]) {
 }
 
 /// Height of one square of [`georeferenced_scene`] over the other as a tracer sees it, in metres.
-///
-/// # Errors
-/// Those of tracing.
 pub fn traced_step(tracer: &Tracer, scene: &Scene, watch: &mut Watch) -> Result<f64> {
     let origin = scene.origin();
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("no geometry".into()))?;
@@ -347,10 +330,6 @@ fn georeferenced(session: &mut Session) -> Result<()> {
     })
 }
 
-/// Builds a tracer for paths.
-///
-/// # Errors
-/// Those of [`Tracer::new`].
 pub(super) fn path_tracer(setup: &Setup, kind: TracerKind, flat: &FlatScene) -> Result<Tracer> {
     Tracer::new(setup.device(), kind, flat, Needs { shading: true, ..Default::default() })
 }

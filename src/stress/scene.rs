@@ -1,7 +1,7 @@
 //! A scene of the user's: what its data will do to single precision, and what tracers make of it.
 //!
-//! What a file holds is reported; what skylit does with it is held against bounds. [`crate::scene::inventory`] counts what is counted anyway; [`Anatomy`] has what numerics depends on
-//! beside that.
+//! A file's contents are reported, and results of skylit with them held against bounds. [`Anatomy`]
+//! has, beside the counts of [`crate::scene::inventory`], what numerics depends on.
 
 use std::collections::HashMap;
 
@@ -27,7 +27,6 @@ use crate::scene::inventory::Inventory;
 use crate::scene::{AlphaMode, Camera, Environment, Geometry, Scene, TexelData, TriangleMesh};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "scene",
     title: "The scene",
@@ -43,16 +42,16 @@ const NEEDLE: f64 = 1e3;
 /// Primitives up to which a scene is held against the oracle in a quick run.
 const QUICK_PRIMITIVES: usize = 1_000_000;
 
-/// What numerics depends on, of one scene.
+/// Properties of a scene that numerics depends on.
 #[derive(Clone, Debug, Default)]
 pub struct Anatomy {
-    /// Largest step between neighbouring positions of a mesh in single precision, scene units; and the coordinate at which it occurs.
+    /// Largest step between neighbouring positions of a mesh, scene units; and its coordinate.
     pub step: (f64, f64),
     /// The step over the size of its mesh: how much of a detail is lost.
     pub relative_step: f64,
     /// Bits of positions that say where the mesh is and not how it looks, of 24.
     pub spent_bits: f64,
-    /// Triangles by the decade of their aspect: below 10, below 100, and so on; the last has all from 1e7 on.
+    /// Triangles by the decade of their aspect: below 10, below 100, and so on; from 1e7 on.
     pub aspects: [u64; 8],
     /// Largest aspect of a triangle that has an area.
     pub worst_aspect: f64,
@@ -78,7 +77,7 @@ pub struct Anatomy {
 
 impl Anatomy {
     /// Looks at all of a scene.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn from_scene(scene: &Scene) -> Self {
         let mut out = Self::default();
         let meshes: Vec<(Self, [f64; 2])> = scene.meshes.par_iter().map(|m| Self::of_mesh(&m.geometry)).collect();
         for (mesh, _) in &meshes {
@@ -90,6 +89,8 @@ impl Anatomy {
             out.normals = (out.normals.0 + mesh.normals.0, out.normals.1 + mesh.normals.1);
             out.bad_normals += mesh.bad_normals;
         }
+
+        // Instances stretch meshes, and may coincide.
         let (mut shortest, mut longest) = (f64::INFINITY, 0.0f64);
         let mut places: HashMap<(usize, [u64; 12]), u64> = HashMap::new();
         for instance in &scene.instances {
@@ -120,7 +121,7 @@ impl Anatomy {
         out
     }
 
-    /// Of a mesh in its own space, and its shortest and longest edge.
+    /// The anatomy of a mesh in its own space, and its shortest and longest edge.
     fn of_mesh(geometry: &Geometry) -> (Self, [f64; 2]) {
         let mut out = Self::default();
         if let Some((lo, hi)) = geometry.bounds() {
@@ -230,13 +231,15 @@ fn scene_of(setup: &Setup) -> Result<&Scene> {
     setup.scene().ok_or_else(|| Error::Usage("no scene was named".into()))
 }
 
-/// What the scene's data will do, a check each.
+/// The expected effects of the scene's data, a check each.
 pub fn data(scene: &Scene) -> Vec<Check> {
-    let (inventory, anatomy) = (Inventory::from_scene(scene), Anatomy::of(scene));
+    let (inventory, anatomy) = (Inventory::from_scene(scene), Anatomy::from_scene(scene));
     let mut out = Vec::new();
     let mut report = |name: &str, value: f64, unit: &'static str, sentence: String| {
         out.push(Check::reported(name, value, unit).says(sentence));
     };
+
+    // Positions have a limited number of bits.
     let (step, at) = anatomy.step;
     let bits = anatomy.spent_bits.floor();
     report(
@@ -259,9 +262,10 @@ pub fn data(scene: &Scene) -> Vec<Check> {
         let (origin, size) = (scene.origin(), (hi - lo).max_element());
         let before = step_at(lo.abs().max(hi.abs()).max_element());
         let after = step_at((lo - origin).abs().max((hi - origin).abs()).max_element());
-        let sentence = match origin == DVec3::ZERO {
-            true => "the origin is left where it is".to_owned(),
-            false => format!("the origin was moved to {origin}: a step was {}, and is {} now", number(before), number(after)),
+        let sentence = if origin == DVec3::ZERO {
+            "the origin is left where it is".to_owned()
+        } else {
+            format!("the origin was moved to {origin}: a step was {}, and is {} now", number(before), number(after))
         };
         report("step of the scene for tracers", after, "units", sentence);
         // what moving cannot mend: a scene that is large and detailed
@@ -270,6 +274,8 @@ pub fn data(scene: &Scene) -> Vec<Check> {
         let lost = if ratio > 1e7 { "; the shortest are below a rounding of the longest" } else { "" };
         report("longest edge over shortest", ratio, "", format!("edges differ by {:.0} decades{lost}", ratio.log10().max(0.0)));
     }
+
+    // Triangles may have hardly any area.
     let dropped = inventory.degenerate_triangles as f64;
     report(
         "degenerate triangles",
@@ -284,7 +290,7 @@ pub fn data(scene: &Scene) -> Vec<Check> {
     let needles: u64 = anatomy.aspects[3..].iter().sum();
     let histogram: Vec<String> =
         (0i32..).zip(anatomy.aspects).filter(|(_, n)| *n > 0).map(|(k, n)| format!("1e{k}: {n}")).collect();
-    // t of a hit is off by the rounding of the coordinates over the sine under which the ray meets the plane, not by the aspect; barycentrics are off by it
+    // the aspect spoils barycentrics, but not t, which rounds with coordinates
     let lost = anatomy.worst_aspect * f64::from(f32::EPSILON);
     out.push(Check::reported("needles", needles as f64, "triangles").says(format!(
         "of aspect {NEEDLE:e} and more; the worst has {}, where barycentrics are good to {}; by aspect from {}",
@@ -292,6 +298,8 @@ pub fn data(scene: &Scene) -> Vec<Check> {
         number(lost.min(1.0)),
         histogram.join(", ")
     )));
+
+    // Meshes may be open or lie on one another.
     let open = inventory.open_edges as f64;
     let sentence = match inventory.open_edges {
         0 => format!("all {} meshes are closed", inventory.closed_meshes),
@@ -307,6 +315,8 @@ pub fn data(scene: &Scene) -> Vec<Check> {
         _ => "ties: which one a ray meets is not said",
     }));
     out.push(Check::reported("coincident instances", anatomy.coincident_instances as f64, "instances"));
+
+    // Normals, transforms and texels may be wrong.
     let (with, against) = anatomy.normals;
     let percent = 100.0 * against as f64 / with.max(1) as f64;
     out.push(Check::reported("normals that disagree with winding", percent, "%").says(match with {
@@ -324,13 +334,16 @@ pub fn data(scene: &Scene) -> Vec<Check> {
     out
 }
 
-/// Rays at edges between two triangles that both face their origin, so that no rounding makes them pass: every miss is a leak. Triangles whose height is close to a rounding, and
-/// cut-out and blended surfaces, are left out. Empty where a scene has no such edge.
+/// Rays at edges between two triangles that both face their origin, so that no rounding makes them
+/// pass: every miss is a leak. Triangles almost without height, and cut-out and blended surfaces,
+/// are left out. Empty where a scene has no such edge.
 pub fn edge_rays(scene: &Scene, oracle: &Oracle, count: usize, seed: u32) -> Vec<Ray> {
     let opaque = |instance: u32| {
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh];
         scene.materials[mesh.material].alpha_mode == AlphaMode::Opaque
     };
+
+    // Leaves out triangles that are close to a rounding.
     let Some((lo, hi)) = oracle.bounds() else { return Vec::new() };
     let reach = lo.abs().max(hi.abs()).max_element();
     let rounding = reach * f64::from(f32::EPSILON);
@@ -345,6 +358,8 @@ pub fn edge_rays(scene: &Scene, oracle: &Oracle, count: usize, seed: u32) -> Vec
         })
         .map(|t| (t.v, t.instance))
         .collect();
+
+    // Finds edges of exactly two triangles, and the normals of both.
     let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     // by instance and ends: how many triangles, and the corners of the first two beside the edge
     type Edge = (u32, [[u64; 3]; 2]);
@@ -365,7 +380,7 @@ pub fn edge_rays(scene: &Scene, oracle: &Oracle, count: usize, seed: u32) -> Vec
         .map(|((_, ends), (_, corners))| {
             let [a, b] = ends.map(|e| DVec3::from(e.map(f64::from_bits)));
             let along = (b - a).normalize();
-            // normals on the same side of both, whatever their winding; opposite ones where one triangle lies on the other
+            // normals on one side of both, whatever their winding; opposite ones for folds
             let [p, q] = corners.map(|c| ((c - a) - along * (c - a).dot(along)).normalize());
             ([a, b], along.cross(p), q.cross(along))
         })
@@ -377,6 +392,8 @@ pub fn edge_rays(scene: &Scene, oracle: &Oracle, count: usize, seed: u32) -> Vec
     if pairs.is_empty() {
         return Vec::new();
     }
+
+    // Aims rays at points of edges, from directions that both triangles face.
     (0..count)
         .into_par_iter()
         .map(|i| {
@@ -399,18 +416,13 @@ pub fn edge_rays(scene: &Scene, oracle: &Oracle, count: usize, seed: u32) -> Vec
         .collect()
 }
 
-/// Of [`edge_rays`], those that meet nothing up to their edge, which is at t = 1.
-///
-/// # Errors
-/// Those of tracing.
+/// Counts those of [`edge_rays`] that meet nothing up to their edge, which is at t = 1.
 pub fn leaks(tracer: &Tracer, rays: &[Ray], control: &mut dyn Control) -> Result<usize> {
     Ok(trace(tracer, rays, Mode::Closest, 1, control)?.0.iter().filter(|h| h.t.is_nan() || h.t > 1.01).count())
 }
 
-/// Spawned rays of an image that meet the triangle from which they start, and how many there are; `None` if the tracer's camera rays and spawned rays do not correspond.
-///
-/// # Errors
-/// Those of rendering and tracing.
+/// Spawned rays of an image that meet the triangle from which they start, and all of them; `None`
+/// if the tracer's camera rays and spawned rays do not correspond.
 pub fn self_hits(
     tracer: &Tracer,
     scene: &Scene,
@@ -441,7 +453,7 @@ const OVERLAP: &str = "surfaces on one another";
 
 /// Which part of the surface lies on another one.
 fn overlap(scene: &Scene, oracle: &Oracle, points: u32) -> Check {
-    let found = Overlaps::of(oracle, points, 3);
+    let found = Overlaps::measure(oracle, points, 3);
     let percent = 100.0 * found.covered as f64 / found.points.max(1) as f64;
     let sentence = match found.example {
         None => "no triangle lies on another in the same plane".to_owned(),
@@ -475,6 +487,8 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
         Ok(view) => view,
         Err(e) => return session.measure(parity_name, None, |_, _| Ok(Check::not_applicable(parity_name, e.to_string()))),
     };
+
+    // Compares hits with the oracle, and looks for leaks at shared edges.
     if count > effort.pick(QUICK_PRIMITIVES, usize::MAX) {
         let why = format!("{count} primitives are more than {QUICK_PRIMITIVES}: use --full");
         session.measure(parity_name, None, |_, _| Ok(Check::not_applicable(parity_name, why)))?;
@@ -500,6 +514,8 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
             Ok(Check::none_of(leak_name, leaks as u64, "leaks", is_ours).says(format!("of {}", set.len())))
         })?;
     }
+
+    // Spawned rays leave their triangle.
     session.measure_each(self_name, kinds, |s, kind, w| {
         Ok(match self_hits(&s.tracer(kind, &scene)?, &scene, &view, effort.pick(128, 1024), w)? {
             Some((hits, of)) => Check::at_most(self_name, hits as f64, "rays", 0.0).says(format!("of {of}")),

@@ -17,17 +17,14 @@ use crate::tracer::{DeviceSettings, Needs, Tracer, TracerChoice, TracerKind};
 /// Pipelines that stay compiled: scenes of the suite share most of them.
 const KEPT_PIPELINES: usize = 256;
 
-/// A section of the suite.
 pub struct Section {
     /// Name on the command line.
     pub name: &'static str,
-    /// Title in reports.
     pub title: &'static str,
     /// A sentence on what the section tries.
     pub about: &'static str,
     /// True if the section is about the user's scene; the others are about built-in scenes.
     pub of_scene: bool,
-    /// Measures all of it.
     pub run: fn(&mut Session) -> Result<()>,
 }
 
@@ -89,7 +86,7 @@ impl Setup {
     /// The setup that options describe.
     ///
     /// # Errors
-    /// [`Error::Device`] for a tracer that the device lacks; those of opening it and of loading the scene.
+    /// [`Error::Device`] for a tracer that the device lacks; errors of the device and the scene.
     pub(super) fn open(options: &Options, settings: &DeviceSettings) -> Result<Self> {
         let confine = if options.confine { Confine::SceneFolder } else { Confine::Nowhere };
         let load = |scene: &str| load::load_with(scene, &LoadOptions { confine, ..LoadOptions::default() });
@@ -100,12 +97,10 @@ impl Setup {
         Ok(Self { device, tracers, device_settings, effort: options.effort, program, scene })
     }
 
-    /// The device.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
-    /// The tracers under test.
     pub fn tracers(&self) -> Vec<TracerKind> {
         self.tracers.clone()
     }
@@ -121,20 +116,15 @@ impl Setup {
         }
     }
 
-    /// The amount of rays that are traced.
     pub fn effort(&self) -> Effort {
         self.effort
     }
 
-    /// The user's scene.
     pub fn scene(&self) -> Option<&Scene> {
         self.scene.as_ref()
     }
 
     /// Builds a tracer for a scene, for geometry alone.
-    ///
-    /// # Errors
-    /// Those of [`Tracer::new`].
     pub fn tracer(&self, kind: TracerKind, scene: &Scene) -> Result<Tracer> {
         Tracer::new(&self.device, kind, &FlatScene::new(scene), Needs::default())
     }
@@ -160,7 +150,6 @@ impl<'a> Session<'a> {
         self.wanted.is_empty() || self.wanted.iter().any(|text| name.contains(text.as_str()))
     }
 
-    /// The setup that sections measure with.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -168,7 +157,7 @@ impl<'a> Session<'a> {
     /// Runs a section and returns its checks.
     ///
     /// # Errors
-    /// Interruption, and those after which nothing else can be measured; what goes wrong with a check is its outcome.
+    /// Interruption, and errors after which nothing can be measured; others are a check's outcome.
     pub fn run(&mut self, section: &Section) -> Result<Vec<Check>> {
         self.section = section.name;
         (section.run)(self)?;
@@ -177,9 +166,6 @@ impl<'a> Session<'a> {
 
     /// Makes checks whose names are only known then, and keeps those that are wanted. An error of
     /// `measure` is a check with this name that fails.
-    ///
-    /// # Errors
-    /// Interruption, and a device that was lost.
     pub fn measure_all(
         &mut self,
         name: &str,
@@ -209,9 +195,6 @@ impl<'a> Session<'a> {
     }
 
     /// Makes checks with these names together, if one of them is wanted.
-    ///
-    /// # Errors
-    /// Those of [`Session::measure_all`].
     pub fn measure_these(
         &mut self,
         names: &[&str],
@@ -225,9 +208,6 @@ impl<'a> Session<'a> {
     }
 
     /// Makes one check, which has this name, if it is wanted.
-    ///
-    /// # Errors
-    /// Those of [`Session::measure_all`].
     pub fn measure(
         &mut self,
         name: &str,
@@ -238,9 +218,6 @@ impl<'a> Session<'a> {
     }
 
     /// Makes a check of each of these tracers.
-    ///
-    /// # Errors
-    /// Those of [`Session::measure_all`].
     pub fn measure_each(
         &mut self,
         name: &str,
@@ -273,10 +250,9 @@ fn tracers(info: &DeviceInfo, settings: &DeviceSettings) -> Result<Vec<TracerKin
         None | Some(TracerChoice::Auto) => return Ok(all),
         Some(choice) => choice.on(info).0,
     };
-    match all.contains(&kind) {
-        true => Ok(vec![kind]),
-        false => {
-            Err(Error::Device(format!("'{}' has no tracer '{kind}': leave --tracer out, or see `skylit doctor`", info.name)))
-        }
+    if all.contains(&kind) {
+        Ok(vec![kind])
+    } else {
+        Err(Error::Device(format!("'{}' has no tracer '{kind}': leave --tracer out, or see `skylit doctor`", info.name)))
     }
 }

@@ -1,4 +1,5 @@
-//! Section 5, alpha, spheres and glass: cutouts at their threshold, cameras inside of bodies, radii of 1e5 to 1, total internal reflection, nested dielectrics, 64 blended layers.
+//! Section 5, alpha, spheres and glass: cutouts at their threshold, cameras inside of bodies, radii
+//! of 1e5 to 1, total internal reflection, nested dielectrics, 64 blended layers.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -17,7 +18,6 @@ use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
 use crate::scene::{AlphaMode, Camera, Environment, Geometry, Material, Scene, Sphere};
 use crate::tracer::Tracer;
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "transparency",
     title: "Alpha, spheres, glass",
@@ -34,17 +34,14 @@ pub fn cutout(alpha: f32) -> Scene {
     scene
 }
 
-/// Of rays straight down at [`cutout`], those that hit.
-///
-/// # Errors
-/// Those of tracing.
+/// Counts rays straight down at [`cutout`] that hit.
 pub fn cutout_hits(tracer: &Tracer, control: &mut dyn Control) -> Result<usize> {
     let rays: Vec<Ray> =
         (0..100).map(|i| ray(DVec3::new(f64::from(i % 10) - 4.3, 1.0, f64::from(i / 10) - 4.3), DVec3::NEG_Y)).collect();
     Ok(trace(tracer, &rays, Mode::Closest, 1, control)?.0.iter().filter(|h| h.is_hit()).count())
 }
 
-/// `count` black layers of this alpha before an environment of 1, and what is left of it: `(1 - alpha)^count`.
+/// `count` black layers of this alpha before an environment of 1, and `(1 - alpha)^count`.
 pub fn layers(count: u32, alpha: f32) -> (Scene, f64) {
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 0.2);
     let mut scene = Scene { environment: Environment::Uniform(Vec3::ONE), ..scene_of(Vec::new(), camera) };

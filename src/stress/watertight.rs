@@ -1,4 +1,5 @@
-//! Section 2, watertightness: rays at shared edges and vertices of closed meshes, and rays with zero and negative-zero components.
+//! Section 2, watertightness: rays at shared edges and vertices of closed meshes, and rays with
+//! zero and negative-zero components.
 
 use glam::DVec3;
 
@@ -12,7 +13,6 @@ use crate::ray::{Hit, Ray};
 use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
 use crate::tracer::{Tracer, TracerKind};
 
-/// See the module's text.
 pub const SECTION: Section = Section {
     name: "watertight",
     title: "Watertightness",
@@ -21,8 +21,8 @@ pub const SECTION: Section = Section {
     run,
 };
 
-/// Rays along the axes, from the middle of a closed body that is its own mirror image in each axis out through each of its vertices: two components of each direction are
-/// zero or negative zero, and every plane between triangles is met exactly.
+/// Rays along the axes out of the middle of a symmetric closed body through each of its vertices:
+/// two components are zero or negative zero, and planes between triangles are met exactly.
 pub fn axis_rays(oracle: &Oracle) -> Vec<Ray> {
     let mut rays = Vec::new();
     for (i, corner) in oracle.triangles().iter().flat_map(|t| t.v).enumerate() {
@@ -37,19 +37,14 @@ pub fn axis_rays(oracle: &Oracle) -> Vec<Ray> {
 }
 
 /// Rays of a set that meet nothing, asked for any hit and for the closest.
-///
-/// # Errors
-/// Those of tracing.
 pub fn leaks(tracer: &Tracer, rays: &[Ray], control: &mut dyn Control) -> Result<[usize; 2]> {
     let missed = |hits: Vec<Hit>| hits.iter().filter(|h| !h.is_hit()).count();
     let any = missed(trace(tracer, rays, Mode::Any, 1, control)?.0);
     Ok([any, missed(trace(tracer, rays, Mode::Closest, 1, control)?.0)])
 }
 
-/// The check of a closed scene: not one of `rays` may leave it through the compute tracer. What the hardware tracers let through is their driver's affair, and reported.
-///
-/// # Errors
-/// Those of tracing.
+/// The check of a closed scene: none of `rays` may leave it through the compute tracer. Leaks of
+/// hardware tracers are their driver's affair, and reported.
 pub fn check(tracer: &Tracer, name: &str, rays: &[Ray], control: &mut dyn Control) -> Result<Check> {
     Ok(held(tracer.kind(), name, leaks(tracer, rays, control)?, rays.len()))
 }
@@ -73,6 +68,8 @@ fn run(session: &mut Session) -> Result<()> {
     let count =
         |kind| if kind == TracerKind::Compute { effort.pick(1_000_000, 100_000_000) } else { effort.pick(150_000, 10_000_000) };
     let kinds = session.setup().tracers();
+
+    // Every scene has its check, and every tracer the sum of all.
     let mut sums = vec![(0u64, 0u64); kinds.len()];
     for (what, scene) in &scenes {
         let name = format!("edges and vertices: {what}");
@@ -104,6 +101,8 @@ fn run(session: &mut Session) -> Result<()> {
             Ok(Check::none_of(name, leaks, "leaks", is_ours).says(format!("of {rays} rays")))
         })?;
     }
+
+    // Rays along axes.
     let name = "zero and negative-zero components";
     let mut axes = analytic::closed_box(1.0, SceneTransform::default());
     axes.meshes[0].geometry = shapes::icosphere(1.0, 5);
@@ -114,5 +113,4 @@ fn run(session: &mut Session) -> Result<()> {
     })
 }
 
-/// Rays in one go.
 const PART: usize = 1_000_000;

@@ -1,6 +1,6 @@
 //! Makes golden images, and says what changed.
 
-use super::golden::{FIRST_SEED, Golden, Maker, REPLICATES};
+use super::golden::{FIRST_SEED, Golden, Origin, REPLICATES};
 use super::manifest::{Frame, Manifest, names_driver};
 use super::session::Session;
 use crate::error::{Error, Result};
@@ -12,17 +12,15 @@ use crate::output::Samples;
 use crate::report::format_number;
 use crate::tracer::TracerKind;
 
-/// What became of a golden image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "lowercase", tag = "change")]
 pub enum Change {
     /// There was none.
     New,
-    /// It is as it was.
     Unchanged,
     /// It is another now.
     Changed {
-        /// What changed, in a line.
+        /// A line about the differences.
         text: String,
     },
 }
@@ -48,7 +46,7 @@ pub fn check_driver(manifest: &Manifest, info: &DeviceInfo) -> Result<()> {
     Ok(())
 }
 
-/// The tracer that a frame's golden image is made with: the device's own choice, if the frame is rendered with it.
+/// The tracer of a frame's golden image: the device's own choice, if the frame is rendered with it.
 pub fn tracer(session: &Session, frame: &Frame) -> Result<TracerKind> {
     let kinds: Vec<_> = session.tracers(&frame.tracers).into_iter().filter(|k| k.1).map(|k| k.0).collect();
     let (auto, _) = TracerKind::auto(session.info());
@@ -59,7 +57,7 @@ pub fn tracer(session: &Session, frame: &Frame) -> Result<TracerKind> {
 /// Renders a frame's golden image.
 ///
 /// # Errors
-/// Those of the renderer; [`Error::CheckFailed`] for an image that is too noisy for the bias that it is to show.
+/// Errors of the renderer; [`Error::CheckFailed`] for an image too noisy for the bias to be found.
 pub fn render(
     session: &mut Session,
     manifest: &Manifest,
@@ -67,13 +65,13 @@ pub fn render(
     kind: TracerKind,
     control: &mut dyn Control,
 ) -> Result<Golden> {
-    let (path, maker) = (manifest.golden(frame), Maker::new(session.info(), kind));
+    let (path, origin) = (manifest.golden(frame), Origin::new(session.info(), kind));
     let Some(limit) = &frame.tolerance.z_test else {
-        return Golden::of_image(&path, frame, session.render(frame, kind, None, None, control)?, &maker);
+        return Golden::of_image(&path, frame, session.render(frame, kind, None, None, control)?, &origin);
     };
     let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
     let images = seeds.map(|seed| session.render(frame, kind, Some(seed), None, control)).collect::<Result<Vec<_>>>()?;
-    let golden = Golden::of_replicates(&path, frame, &images, &maker)?;
+    let golden = Golden::of_replicates(&path, frame, &images, &origin)?;
     if let (Some(bias), Some(reference)) = (limit.bias, &golden.reference) {
         let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::from_image(&images[0])?, reference)?;
         let found = verdict.detectable_bias;
@@ -88,9 +86,6 @@ pub fn render(
 }
 
 /// Writes a golden image where it is another than before.
-///
-/// # Errors
-/// [`Error::Output`]; those of comparing.
 pub fn update(golden: &Golden) -> Result<Change> {
     if !golden.path.exists() {
         golden.save()?;
@@ -99,7 +94,7 @@ pub fn update(golden: &Golden) -> Result<Change> {
     let before = Golden::load(&golden.path);
     let after = as_read(golden)?;
     let text = match &before {
-        Ok(before) if Contents::of(before) == Contents::of(&after) => return Ok(Change::Unchanged),
+        Ok(before) if Contents::from_golden(before) == Contents::from_golden(&after) => return Ok(Change::Unchanged),
         Ok(before) => changes(before, &after)?,
         Err(e) => format!("the golden image before could not be read ({e})"),
     };
@@ -124,7 +119,7 @@ struct Contents {
 }
 
 impl Contents {
-    fn of(golden: &Golden) -> Self {
+    fn from_golden(golden: &Golden) -> Self {
         let bits = |samples: &Samples| match samples {
             Samples::F32(s) => s.iter().map(|v| v.to_bits()).collect(),
             Samples::U32(s) => s.clone(),
@@ -137,7 +132,7 @@ impl Contents {
     }
 }
 
-/// What is different, in a line.
+/// The differences, in a line.
 fn changes(before: &Golden, after: &Golden) -> Result<String> {
     let mut parts = Vec::new();
     let [old, new] = [before, after].map(|g| [g.image.width, g.image.height]);
@@ -149,15 +144,14 @@ fn changes(before: &Golden, after: &Golden) -> Result<String> {
     } else {
         let c = compare(&after.image, &before.image, &CompareOptions::default())?;
         // where no pixel shows anything, in either image
-        match c.max == 0.0 || c.mask_pixels == 0 {
-            true => parts.push("the same colours".to_owned()),
-            false => {
-                let flip = c.flip.map(|f| format!(", FLIP {f:.4}")).unwrap_or_default();
-                let sign = if c.bias > 0.0 { "+" } else { "" };
-                let [rmse, bias, max] = [c.rmse, c.bias, c.max].map(format_number);
-                let text = format!("rmse {rmse}, bias {sign}{bias}, largest difference {max}{flip}");
-                parts.push(text);
-            }
+        if c.max == 0.0 || c.mask_pixels == 0 {
+            parts.push("the same colours".to_owned())
+        } else {
+            let flip = c.flip.map(|f| format!(", FLIP {f:.4}")).unwrap_or_default();
+            let sign = if c.bias > 0.0 { "+" } else { "" };
+            let [rmse, bias, max] = [c.rmse, c.bias, c.max].map(format_number);
+            let text = format!("rmse {rmse}, bias {sign}{bias}, largest difference {max}{flip}");
+            parts.push(text);
         }
     }
     let driver = |g: &Golden| g.driver().unwrap_or("an unknown driver").to_owned();

@@ -17,7 +17,7 @@ use crate::tracer::TracerKind;
 pub const REPLICATES: u32 = 32;
 /// Seed of the first of them, the others follow: far from those that people choose.
 pub const FIRST_SEED: u32 = 0x5EED_0000;
-/// Bits of the mantissa that means are stored with: their error is a tenth of what counts as rounding.
+/// Bits of the mantissa of stored means, whose error is a tenth of what counts as rounding.
 const MEAN_BITS: u32 = 15;
 /// Bits of the mantissa that variances are stored with.
 const VARIANCE_BITS: u32 = 7;
@@ -37,30 +37,24 @@ mod key {
     pub const WHOLE: &str = "verify.mean_variance";
 }
 
-/// A golden image.
 #[derive(Clone, Debug)]
 pub struct Golden {
-    /// The file.
     pub path: PathBuf,
-    /// Its channels and metadata; of a PNG, linear values.
+    /// The channels and metadata; of a PNG, linear values.
     pub image: Image,
-    /// What a Z-test compares with, of golden images that were made for one.
+    /// The reference of a Z-test, of golden images that were made for one.
     pub reference: Option<Reference>,
 }
 
-/// What a golden image is made on.
+/// The place where a golden image is made.
 #[derive(Clone, Debug)]
-pub struct Maker {
-    /// Device name.
+pub struct Origin {
     pub device: String,
-    /// Driver and its version.
     pub driver: String,
-    /// The tracer.
     pub tracer: TracerKind,
 }
 
-impl Maker {
-    /// A device and a tracer.
+impl Origin {
     pub fn new(info: &DeviceInfo, tracer: TracerKind) -> Self {
         Self { device: info.name.clone(), driver: info.driver.clone(), tracer }
     }
@@ -73,7 +67,7 @@ impl Golden {
     /// [`Error::Input`] for a file that cannot be read.
     pub fn load(path: &Path) -> Result<Self> {
         let mut image = output::load(path)?;
-        if output::ImageFormat::of(path)? == output::ImageFormat::Png {
+        if output::ImageFormat::from_path(path)? == output::ImageFormat::Png {
             image.metadata.extend(png_text::read_metadata(path)?);
         }
         let reference = read_reference(&image).map_err(|message| Error::input(path, message))?;
@@ -81,7 +75,7 @@ impl Golden {
     }
 
     /// A golden image from a single render.
-    pub fn of_image(path: &Path, frame: &Frame, image: Image, maker: &Maker) -> Result<Self> {
+    pub fn of_image(path: &Path, frame: &Frame, image: Image, origin: &Origin) -> Result<Self> {
         check_finite(&image)?;
         let mut image = match frame.format {
             GoldenFormat::Exr => image,
@@ -91,7 +85,7 @@ impl Golden {
             // noise that nothing is compared with would fill most of the file
             image.channels.retain(|c| !c.name.starts_with("variance") && c.name != "samples");
         }
-        sign(&mut image, frame, maker);
+        sign(&mut image, frame, origin);
         Ok(Self { path: path.to_owned(), image, reference: None })
     }
 
@@ -99,7 +93,7 @@ impl Golden {
     ///
     /// # Errors
     /// [`Error::Usage`] for images without variances.
-    pub fn of_replicates(path: &Path, frame: &Frame, images: &[Image], maker: &Maker) -> Result<Self> {
+    pub fn of_replicates(path: &Path, frame: &Frame, images: &[Image], origin: &Origin) -> Result<Self> {
         images.iter().try_for_each(check_finite)?;
         let renders = images.iter().map(Estimate::from_image).collect::<Result<Vec<_>>>()?;
         let reference = Reference::new(&renders)?;
@@ -112,18 +106,14 @@ impl Golden {
         let whole = reference.whole.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         image.metadata.push((key::WHOLE.into(), whole));
         image.metadata.push((key::REPLICATES.into(), reference.replicates.to_string()));
-        sign(&mut image, frame, maker);
+        sign(&mut image, frame, origin);
         // as a file will have it: rounded
         let reference = read_reference(&image).map_err(Error::Usage)?;
         Ok(Self { path: path.to_owned(), image, reference })
     }
 
-    /// Writes the file.
-    ///
-    /// # Errors
-    /// [`Error::Output`].
     pub fn save(&self) -> Result<()> {
-        match output::ImageFormat::of(&self.path)? {
+        match output::ImageFormat::from_path(&self.path)? {
             // what it is read for, and nothing for other programs
             output::ImageFormat::Exr => {
                 output::exr::write_with(&self.image, &self.path, &ExrOptions { grey_as_rgb: false, ..Default::default() })
@@ -137,12 +127,13 @@ impl Golden {
         self.image.metadata(key::DRIVER)
     }
 
-    /// The options that the scene decided when it was made: camera, AO radius and light that the frame's settings leave open; `None` if it names none.
+    /// The options that the scene decided (camera, AO radius, light); `None` if it names none.
     pub fn chosen(&self) -> Option<&str> {
         self.image.metadata(CHOSEN)
     }
 
-    /// Puts what was chosen when it was made into the settings of its frame. Images of earlier versions name camera and AO radius alone. `has_camera`: the scene's file has a camera.
+    /// Puts the options that the scene decided into the settings of its frame. Images of earlier
+    /// versions name camera and AO radius alone. `has_camera`: the scene's file has a camera.
     ///
     /// # Errors
     /// [`Error::Input`] for metadata that do not make sense.
@@ -222,20 +213,21 @@ fn check_finite(image: &Image) -> Result<()> {
     }
 }
 
-fn sign(image: &mut Image, frame: &Frame, maker: &Maker) {
+fn sign(image: &mut Image, frame: &Frame, origin: &Origin) {
     let entries = [
-        (key::DEVICE, maker.device.clone()),
-        (key::DRIVER, maker.driver.clone()),
+        (key::DEVICE, origin.device.clone()),
+        (key::DRIVER, origin.driver.clone()),
         (key::RENDER, frame.render_text()),
         (key::SCENE, frame.scene.clone()),
-        (key::TRACER, maker.tracer.name().to_owned()),
+        (key::TRACER, origin.tracer.name().to_owned()),
         (key::VERSION, env!("CARGO_PKG_VERSION").to_owned()),
     ];
     image.metadata.extend(entries.map(|(k, v)| (k.to_owned(), v)));
     image.metadata.sort();
 }
 
-/// The channels of a golden image for a Z-test: means, coverage, variances of a sample, samples, and variances of tiles at each of their pixels.
+/// The channels for a Z-test: means, coverage, variances of a sample, samples, and variances of
+/// tiles at each of their pixels.
 fn channels_of(first: &Image, images: &[Image], reference: &Reference) -> Vec<Channel> {
     let known = &reference.estimate;
     let names = channels_with_variance(first);
@@ -274,7 +266,7 @@ fn shortened(value: f64, bits: u32) -> f32 {
     f32::from_bits(rounded)
 }
 
-/// What a Z-test compares with, if the image holds it; a sentence if it is broken.
+/// The reference of a Z-test, if the image holds it; a sentence if it is broken.
 fn read_reference(image: &Image) -> std::result::Result<Option<Reference>, String> {
     let Some(replicates) = image.metadata(key::REPLICATES) else { return Ok(None) };
     let wrong = |what: &str| format!("{what}: not a golden image of this version; make it again with --bless");

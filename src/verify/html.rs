@@ -1,4 +1,4 @@
-//! The results as a page: a table of all frames, and of each that differs its image, its golden image and how they differ.
+//! The results as a page: a table of all frames, and the images of each that differs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,7 @@ use crate::output::{Image, Samples};
 use crate::report::comparison::{NamedImage, section};
 use crate::report::{self, Cell, Page, Part, Row, Section, Status, Table};
 
-/// Writes the page into a folder, and returns its path. `frames` and `folder`: of the manifest. `command`: the command that was typed.
-///
-/// # Errors
-/// [`crate::Error::Output`].
+/// Writes the page into a folder and returns its path. `command`: the command that was typed.
 pub fn write(summary: &Summary, frames: &[Frame], folder: &Path, command: &str, dir: &Path) -> Result<PathBuf> {
     let frames: BTreeMap<&str, &Frame> = frames.iter().rev().map(|f| (f.name.as_str(), f)).collect();
     let mut sections = vec![Section::default()];

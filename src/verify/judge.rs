@@ -22,13 +22,12 @@ pub const BAD_DIFFERENCE: u8 = 25;
 /// A condition, and whether it holds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
-    /// Name of the condition, as in the manifest; `size`, `channels` and `finite` are conditions on every frame.
+    /// The manifest's name for it, or `size`, `channels` and `finite`, which hold for every frame.
     pub condition: &'static str,
-    /// Does it hold?
     pub holds: bool,
-    /// What was found, in a few words.
+    /// The finding, in a few words.
     pub text: String,
-    /// What was found, in numbers.
+    /// The finding, in numbers.
     pub values: Value,
 }
 
@@ -42,17 +41,15 @@ impl Check {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Judgement {
-    /// The conditions.
     pub checks: Vec<Check>,
 }
 
 impl Judgement {
-    /// Do all conditions hold?
     pub fn holds(&self) -> bool {
         self.checks.iter().all(|c| c.holds)
     }
 
-    /// What was found: of conditions that do not hold, or of all if all hold.
+    /// The findings of conditions that do not hold, or of all if all hold.
     pub fn text(&self) -> String {
         let holds = self.holds();
         let texts = self.checks.iter().filter(|c| c.holds == holds && !c.text.is_empty()).map(|c| c.text.as_str());
@@ -73,6 +70,8 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
             checks: vec![Check::new("size", false, text, json!({ "image": size, "golden": golden_size }))],
         });
     }
+
+    // Everything else asks for finite values.
     let tolerance = &frame.tolerance;
     let broken = broken_pixels(frame, image, golden);
     let text = if broken == 0 {
@@ -81,17 +80,18 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
         format!("{} with values that are not finite", plural(broken as usize, "pixel", "pixels"))
     };
     let mut checks = vec![Check::new("finite", broken == 0, text, json!({ "pixels": broken }))];
-
     if tolerance.exact {
         checks.push(exact(frame, image, golden)?);
         return Ok(Judgement { checks });
     }
-    let (shown, expected) = (Shown::of(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
+    let (shown, expected) = (Shown::from_image(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
     if shown.channels != expected.channels {
         let text = format!("the image has {} channels of colour, the golden image {}", shown.channels, expected.channels);
         checks.push(Check::new("channels", false, text, json!({ "image": shown.channels, "golden": expected.channels })));
         return Ok(Judgement { checks });
     }
+
+    // Applies every condition of the tolerance, so that the reader sees all that differ.
     if let Some(limit) = &tolerance.flip {
         checks.push(looks(limit, &shown, &expected)?);
     }
@@ -110,7 +110,7 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     Ok(Judgement { checks })
 }
 
-/// Pixels that are not a number in one of the images, finite in one of them alone, or of which samples were left out because they were not.
+/// Counts pixels that are NaN, finite in one image alone, or lack samples that were not finite.
 fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
     let pixels = image.pixel_count();
     let mut broken = vec![false; pixels];
@@ -135,7 +135,7 @@ fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
 fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
     let (mut differing, mut largest, mut worst) = (vec![false; image.pixel_count()], 0.0f64, String::new());
     if frame.format == GoldenFormat::Png {
-        let (shown, expected) = (Shown::of(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
+        let (shown, expected) = (Shown::from_image(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
         if shown.channels != expected.channels {
             return Ok(Check::new("exact", false, "one image is grey, the other has colour", Value::Null));
         }
@@ -166,6 +166,8 @@ fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
             }
         }
     }
+
+    // Describes the differences, and where the golden image is from.
     let pixels = differing.iter().filter(|d| **d).count();
     let values = json!({ "pixels": pixels, "max": largest, "channel": worst });
     if pixels == 0 {
@@ -188,7 +190,7 @@ struct Shown {
 }
 
 impl Shown {
-    fn of(image: &Image, golden: &Golden) -> Result<Self> {
+    fn from_image(image: &Image, golden: &Golden) -> Result<Self> {
         let (bytes, colour) = png::bytes_of(image, 0.0, &golden.path)?;
         Ok(Self { channels: colour.channels(), width: image.width as usize, bytes })
     }
@@ -196,8 +198,8 @@ impl Shown {
     fn golden(frame: &Frame, golden: &Golden) -> Result<Self> {
         match frame.format {
             // a picture already
-            GoldenFormat::Png => Self::of(&golden.image, golden),
-            GoldenFormat::Exr => Self::of(&shown_image(frame, &golden.image), golden),
+            GoldenFormat::Png => Self::from_image(&golden.image, golden),
+            GoldenFormat::Exr => Self::from_image(&shown_image(frame, &golden.image), golden),
         }
     }
 

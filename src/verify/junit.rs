@@ -10,19 +10,13 @@ use super::{FrameResult, Outcome, Summary};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
-/// Writes a file: a suite, and a test case for each frame and tracer. `suite` is its name, such as the folder of the manifest.
-///
-/// # Errors
-/// [`Error::Output`].
+/// Writes a suite with a test case for each frame and tracer. `suite`: a name such as the folder's.
 pub fn write(summary: &Summary, suite: &str, path: &Path) -> Result<()> {
     let xml = text(summary, suite).map_err(|e| Error::Output { path: path.to_owned(), message: e })?;
     write_atomically(path, |file| file.write_all(xml.as_bytes()))
 }
 
-/// Writes a file with one error: the run ended before frames could be judged. What an earlier run wrote must not be taken for the result of this one.
-///
-/// # Errors
-/// [`Error::Output`].
+/// Writes a file with one error, as no frame was judged, in place of an earlier run's file.
 pub fn write_failure(why: &str, suite: &str, path: &Path) -> Result<()> {
     write(&Summary::of_failure(why), suite, path)
 }
@@ -64,9 +58,9 @@ fn case(result: &FrameResult, suite: &str) -> TestCase {
     let mut case = TestCase::new(name, status);
     case.set_classname(suite).set_time(Duration::from_secs_f64(result.seconds));
     let found = if let Outcome::Holds(judgement) = &result.outcome { Some(judgement.text()) } else { None };
-    let told: Vec<String> = found.into_iter().chain(result.note.clone()).collect();
-    if !told.is_empty() {
-        case.set_system_out(told.join("; "));
+    let texts: Vec<String> = found.into_iter().chain(result.note.clone()).collect();
+    if !texts.is_empty() {
+        case.set_system_out(texts.join("; "));
     }
     case
 }

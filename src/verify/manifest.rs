@@ -22,9 +22,9 @@ pub const NAME: &str = "frames.toml";
 /// A manifest of one frame, in a line.
 const EXAMPLE: &str =
     r#"frame = [{ name = "hall", scene = "hall.glb", render = "ao --size 96x64 --spp 64", tolerance = "z_test" }]"#;
-/// Most frames that are rendered before the one that is compared, and with it: a manifest of others is not to run for years.
+/// Maximum of frames rendered for one comparison: a stranger's manifest is not to run for years.
 const MAX_FRAMES: u64 = 10_000;
-/// What names of scenes that are no files begin with.
+/// The prefix of scenes that are no files.
 const BUILTIN: &str = "builtin:";
 
 /// The manifest of a folder of frames.
@@ -32,7 +32,7 @@ const BUILTIN: &str = "builtin:";
 pub struct Manifest {
     /// The folder: golden images lie there.
     pub folder: PathBuf,
-    /// Drivers on which golden images are made: beginnings of `DRIVER` as `skylit doctor` prints it.
+    /// Drivers of golden images: beginnings of `DRIVER` as `skylit doctor` prints it.
     pub pinned: Vec<String>,
     /// The frames, in the order of the file.
     pub frames: Vec<Frame>,
@@ -40,28 +40,24 @@ pub struct Manifest {
     pub confine: Option<PathBuf>,
 }
 
-/// A frame to be rendered.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Its name: that of its golden image without the extension.
+    /// The name of its golden image without the extension.
     pub name: String,
     /// The scene: `builtin:NAME`, or a path from the folder.
     pub scene: String,
-    /// The file of settings that it names.
     pub settings_file: Option<PathBuf>,
-    /// How it is rendered; files that it names are paths from the folder. [`Manifest::settings`] has them as they are.
+    /// The settings; files are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
-    /// The tracers that render it.
     pub tracers: Tracers,
-    /// What may differ.
+    /// The differences that are allowed.
     pub tolerance: Tolerance,
-    /// Format of its golden image.
     pub format: GoldenFormat,
     /// Drivers on which it is rendered, as in [`Manifest::pinned`]; all if empty.
     pub drivers: Vec<String>,
     /// Line of the manifest at which it begins.
     pub line: usize,
-    /// Why it cannot be rendered, in a sentence that names the line; what is above is then not all that the manifest says.
+    /// Why it cannot be rendered, with the line in the manifest; other fields are then incomplete.
     pub problem: Option<String>,
 }
 
@@ -141,7 +137,6 @@ struct Entry {
 /// A manifest's text and where it is, for messages that name a line.
 struct Source<'a> {
     path: &'a Path,
-    /// Where lines end.
     line_ends: Vec<usize>,
     /// Settings by the words that they were parsed from: most frames have the same.
     parsed: RefCell<BTreeMap<String, RenderSettings>>,
@@ -184,7 +179,7 @@ impl<'a> Source<'a> {
 }
 
 impl Manifest {
-    /// Reads the manifest of a folder. What is wrong with one frame is a problem of that frame alone.
+    /// Reads the manifest of a folder. A mistake in one frame is a problem of that frame alone.
     ///
     /// # Errors
     /// [`Error::Input`], naming the line, for a file that cannot be read or is no manifest.
@@ -192,8 +187,8 @@ impl Manifest {
         Self::load_with(folder, false)
     }
 
-    /// As [`Manifest::load`]. `confine`: frames with scenes, settings, environments, camera paths or golden images that do not lie below the folder have a problem, and are not
-    /// read.
+    /// As [`Manifest::load`]. `confine`: frames with files outside of the folder are not read,
+    /// which is their problem.
     ///
     /// # Errors
     /// As [`Manifest::load`], and for a manifest that lies elsewhere.
@@ -239,7 +234,7 @@ impl Manifest {
         self.folder.join(format!("{}.{}", frame.name, frame.format.extension()))
     }
 
-    /// Checks that a golden image may be written: by a link it would be written outside of the folder.
+    /// Checks that no link leads a golden image outside of the folder, where it would be written.
     ///
     /// # Errors
     /// [`Error::Usage`], naming the link.
@@ -252,17 +247,18 @@ impl Manifest {
         let target = crate::files::link_target(&path).map_err(|e| Error::write(&path, &e))?;
         // of a file that does not exist yet, where it would be
         let place = std::fs::canonicalize(&target).or_else(|_| std::fs::canonicalize(crate::files::folder_of(&target)));
-        match place.is_ok_and(|place| place.starts_with(&folder)) {
-            true => Ok(()),
-            false => Err(Error::Usage(format!(
+        if place.is_ok_and(|place| place.starts_with(&folder)) {
+            Ok(())
+        } else {
+            Err(Error::Usage(format!(
                 "{}: is a link to {}, outside of the manifest's folder, where no golden image is written: remove the link",
                 path.display(),
                 target.display()
-            ))),
+            )))
         }
     }
 
-    /// The files that frames are rendered from, as far as the manifest tells, and with `goldens` their golden images.
+    /// The files that frames are rendered from, and with `goldens` their golden images.
     pub fn add_inputs(&self, plan: &mut FilePlan, goldens: bool) {
         plan.reads("the manifest", self.folder.join(NAME));
         for frame in &self.frames {
@@ -281,9 +277,10 @@ impl Manifest {
 
     /// The scene of a frame, as [`crate::Renderer::open`] takes it.
     pub fn scene(&self, frame: &Frame) -> String {
-        match frame.scene.starts_with(BUILTIN) {
-            true => frame.scene.clone(),
-            false => self.folder.join(&frame.scene).to_string_lossy().into_owned(),
+        if frame.scene.starts_with(BUILTIN) {
+            frame.scene.clone()
+        } else {
+            self.folder.join(&frame.scene).to_string_lossy().into_owned()
         }
     }
 
@@ -330,7 +327,8 @@ impl Frame {
     }
 }
 
-/// Does one of these beginnings name the driver? `llvmpipe Mesa 25.0` names `llvmpipe Mesa 25.0.7`, and not `llvmpipe Mesa 25.01`.
+/// Does one of these beginnings name the driver? `llvmpipe Mesa 25.0` names `llvmpipe Mesa 25.0.7`,
+/// and not `llvmpipe Mesa 25.01`.
 pub fn names_driver(beginnings: &[String], driver: &str) -> bool {
     let names = |beginning: &String| {
         driver.strip_prefix(beginning.as_str()).is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric()))
@@ -396,20 +394,22 @@ fn one_line(name: &str) -> String {
 
 fn check_scene(source: &Source, folder: &Path, name: &Spanned<String>) -> Result<()> {
     if let Some(builtin) = name.get_ref().strip_prefix(BUILTIN) {
-        return match builtin::exists(builtin) {
-            true => Ok(()),
-            false => Err(source.error(name.span(), format!("no built-in scene {builtin} (`skylit scenes` lists them)"))),
+        return if builtin::exists(builtin) {
+            Ok(())
+        } else {
+            Err(source.error(name.span(), format!("no built-in scene {builtin} (`skylit scenes` lists them)")))
         };
     }
     let path = folder.join(name.get_ref());
     source.check_confined(name.span(), &path)?;
-    match path.is_file() {
-        true => Ok(()),
-        false => Err(source.error(name.span(), format!("no scene {}: paths begin at the manifest's folder", path.display()))),
+    if path.is_file() {
+        Ok(())
+    } else {
+        Err(source.error(name.span(), format!("no scene {}: paths begin at the manifest's folder", path.display())))
     }
 }
 
-/// The settings of a frame: a file's, if one is named, replaced by the words of `[defaults]`, and those by the frame's.
+/// The settings of a frame: a file's, replaced by words of `[defaults]`, and those by the frame's.
 fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) -> Result<RenderSettings> {
     let mut settings = RenderSettings::default();
     if let Some(file) = &entry.settings {

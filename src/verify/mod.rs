@@ -1,7 +1,8 @@
 //! `skylit verify`: renders the frames of a manifest and compares each with its golden image.
 //!
-//! [`manifest`] reads `frames.toml`, [`selection`] chooses among its frames, [`session`] renders them, [`judge`] compares by a [`tolerance`], [`golden`] holds
-//! golden images, which [`bless`] makes; [`junit`] writes results for CI servers, [`html`] for people. docs/ci.md is for users.
+//! [`manifest`] reads `frames.toml`, [`selection`] chooses frames, [`session`] renders them,
+//! [`judge`] compares by a [`tolerance`], [`bless`] makes [`golden`] images; [`junit`] writes
+//! results for CI servers, [`html`] for people. docs/ci.md is for users.
 
 pub mod bless;
 pub mod golden;
@@ -32,7 +33,6 @@ use crate::output::Image;
 use crate::renderer::CHOSEN;
 use crate::tracer::{DeviceSettings, TracerKind};
 
-/// What is done with frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Action {
     /// They are compared with their golden images.
@@ -47,52 +47,44 @@ pub enum Action {
     },
 }
 
-/// What is looked at, and how.
+/// The choice of frames, and how they are rendered.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Which frames.
     pub selection: Selection,
-    /// What is done with them.
     pub action: Action,
-    /// Tracers in place of those that the manifest names; one that the device lacks is then a failure.
+    /// Tracers in place of the manifest's; one that the device lacks is then a failure.
     pub tracers: Option<Tracers>,
-    /// Seed of frames whose verdict does not depend on it ([`tolerance::Tolerance::allows_other_seeds`]).
+    /// Seed of frames whose verdict is independent of it
+    /// ([`tolerance::Tolerance::allows_other_seeds`]).
     pub seed: Option<u32>,
     /// Keep the images of frames that differ.
     pub keep_images: bool,
 }
 
-/// What became of a frame.
 #[derive(Clone, Debug, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// It is that of its golden image.
     Holds(Judgement),
-    /// It is another.
     Differs(Judgement),
     /// It is not for this device; why.
     Skipped(String),
     /// It could not be rendered or judged; why.
     Failed(String),
-    /// Its golden image was made.
     Blessed(Change),
 }
 
 /// The result of a frame with one tracer.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FrameResult {
-    /// Name of the frame.
     pub frame: String,
     /// The tracer; `None` if it did not come to that.
     pub tracer: Option<TracerKind>,
-    /// What became of it.
     pub outcome: Outcome,
-    /// Seconds that it took.
     pub seconds: f64,
-    /// Camera, AO radius and light that its settings leave open and that were chosen when its golden image was made, as options of `skylit render`.
+    /// Options of `skylit render` that the settings leave open and the golden image chose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chosen: Option<String>,
-    /// What to know besides, a sentence.
+    /// A remark, in a sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// The image of a frame that differs, and its golden image, if they are kept.
@@ -100,16 +92,13 @@ pub struct FrameResult {
     pub images: Option<Box<(Image, Golden)>>,
 }
 
-/// What all frames were rendered on, and their results.
+/// The device of all frames, and their results.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Summary {
-    /// Device name.
     pub device: String,
-    /// Driver and its version.
     pub driver: String,
     /// Results in the order in which frames were rendered.
     pub frames: Vec<FrameResult>,
-    /// Seconds that all took.
     pub seconds: f64,
 }
 
@@ -144,7 +133,7 @@ impl Summary {
     /// The verdict on all frames.
     ///
     /// # Errors
-    /// [`Error::CheckFailed`] if a frame differs, else [`Error::NotVerified`] if one could not be judged.
+    /// [`Error::CheckFailed`] if a frame differs, else [`Error::NotVerified`] without a verdict.
     pub fn verdict(&self) -> Result<()> {
         // how many frames, and their names; one that several tracers rendered is one
         let frames = |is: fn(&Outcome) -> bool| {
@@ -176,11 +165,13 @@ impl Summary {
 /// Does what the options say with the frames of a manifest.
 ///
 /// # Errors
-/// [`Error::Usage`] for a selection without frames, or a driver on which golden images are not to be made; those of opening the device; interruption. What goes
-/// wrong with one frame is its outcome.
+/// [`Error::Usage`] for no frames, or a driver that makes no golden images; errors of the device;
+/// interruption. Other errors with one frame are its outcome.
 pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
     let start = Instant::now();
     let frames = options.selection.frames(manifest)?;
+
+    // Frames with problems have their result at once.
     let (broken, mut frames): (Vec<&Frame>, Vec<&Frame>) = frames.into_iter().partition(|f| f.problem.is_some());
     let mut results = Vec::new();
     for frame in &broken {
@@ -189,6 +180,7 @@ pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, obse
         observer.result(&result, results.len() + 1, broken.len() + frames.len())?;
         results.push(result);
     }
+
     // a device is for frames that can be rendered
     if frames.is_empty() {
         let (device, driver) = (String::new(), String::new());
@@ -203,6 +195,8 @@ pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, obse
             bless::check_driver(manifest, session.info())?;
         }
     }
+
+    // Renders and judges, or blesses.
     let jobs = jobs(&session, &frames, options);
     for (k, (frame, job)) in jobs.iter().enumerate() {
         let begin = Instant::now();
@@ -210,7 +204,7 @@ pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, obse
             Job::Skip(kind, why) => (*kind, Outcome::Skipped(why.clone()).into()),
             Job::Fail(kind, why) => (*kind, Outcome::Failed(why.clone()).into()),
             Job::Do(kind) => {
-                let done = match one(&mut session, manifest, frame, *kind, options, observer) {
+                let done = match process_frame(&mut session, manifest, frame, *kind, options, observer) {
                     Ok(done) => done,
                     // nothing else can be done either
                     Err(e @ (Error::Interrupted | Error::DeviceLost(_) | Error::Output { .. })) => return Err(e),
@@ -272,7 +266,7 @@ fn jobs<'m>(session: &Session, frames: &[&'m Frame], options: &Options) -> Vec<(
     jobs
 }
 
-/// What became of a frame, and what to say of it.
+/// The outcome of a frame, and remarks on it.
 struct Done {
     outcome: Outcome,
     images: Option<Box<(Image, Golden)>>,
@@ -286,7 +280,7 @@ impl From<Outcome> for Done {
     }
 }
 
-fn one(
+fn process_frame(
     session: &mut Session,
     manifest: &Manifest,
     frame: &Frame,
@@ -307,6 +301,8 @@ fn one(
         let outcome = Outcome::Blessed(bless::update(&golden)?);
         return Ok(Done { chosen: golden.chosen().map(str::to_owned), ..outcome.into() });
     }
+
+    // Finds the golden image, which has to be one of this frame.
     let path = manifest.golden(frame);
     if !path.exists() {
         let file = path.display();
@@ -316,6 +312,8 @@ fn one(
     if let Some(misfit) = golden.misfit(frame) {
         return Ok(Outcome::Failed(format!("{misfit}; make it again with --bless --filter {}", frame.name)).into());
     }
+
+    // Renders and judges.
     let seed = options.seed.filter(|_| frame.tolerance.allows_other_seeds());
     let image = session.render(frame, kind, seed, Some(&golden), observer)?;
     session.check_validation()?;

@@ -19,7 +19,6 @@ pub struct Selection {
 pub struct Shard {
     /// Which part, from 1.
     pub index: usize,
-    /// Number of parts.
     pub count: usize,
 }
 

@@ -13,7 +13,7 @@ use crate::renderer::Renderer;
 use crate::scene::load::{self, Confine, LoadOptions};
 use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
 
-/// Compiled pipelines that are kept from scene to scene: compiling is most of what small images cost on a CPU driver.
+/// Compiled pipelines kept from scene to scene: most of what small images cost on a CPU driver.
 const KEPT_PIPELINES: usize = 64;
 
 /// An open device, and the renderer of the last frame, which the next one reuses.
@@ -31,17 +31,12 @@ struct OpenRenderer {
 }
 
 impl<'m> Session<'m> {
-    /// Opens the device.
-    ///
-    /// # Errors
-    /// Those of [`Device::open`].
     pub fn open(manifest: &'m Manifest, settings: &DeviceSettings) -> Result<Self> {
         settings.check()?;
         let device = Device::open(&Options { keep_pipelines: KEPT_PIPELINES, ..settings.options() })?;
         Ok(Self { manifest, device, settings: settings.clone(), open: None })
     }
 
-    /// What is rendered on.
     pub fn info(&self) -> &DeviceInfo {
         &self.device.info
     }
@@ -56,11 +51,9 @@ impl<'m> Session<'m> {
         }
     }
 
-    /// Renders a frame: a still, or the last of its frames in real time. `seed`: one in place of its own. `golden`: the image that it is to be compared with; what was chosen when that was made
-    /// (camera, AO radius, light) is not chosen anew, so that a scene which has moved makes another image.
-    ///
-    /// # Errors
-    /// Those of the renderer.
+    /// Renders a frame: a still, or the last of its frames in real time. `seed`: one in place of
+    /// its own. What was chosen for `golden` (camera, AO radius, light) is not chosen anew, so that
+    /// a scene which has moved makes another image.
     pub fn render(
         &mut self,
         frame: &Frame,
@@ -83,10 +76,6 @@ impl<'m> Session<'m> {
         image
     }
 
-    /// Loads the scene of a frame.
-    ///
-    /// # Errors
-    /// Those of [`load::load`].
     pub fn load(&mut self, frame: &Frame, kind: TracerKind) -> Result<()> {
         self.renderer(frame, kind).map(drop)
     }
@@ -106,7 +95,7 @@ impl<'m> Session<'m> {
                     _ => load::load_with(&self.manifest.scene(frame), &LoadOptions { confine, ..LoadOptions::default() })?,
                 };
                 let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
-                // the name that the manifest has: a golden image is the same whichever folder it was made in
+                // the manifest's name: a golden image is the same whichever folder it was made in
                 let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
                 OpenRenderer { scene: frame.scene.clone(), kind, renderer }
             }
@@ -120,9 +109,6 @@ impl<'m> Session<'m> {
     }
 
     /// Fails if the validation layer, where it is on, has reported anything.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`].
     pub fn check_validation(&self) -> Result<(), Error> {
         self.device.check_validation()
     }

@@ -1,4 +1,4 @@
-//! What of a frame may differ from its golden image.
+//! Differences of a frame from its golden image that are allowed.
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
@@ -6,8 +6,8 @@ use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 /// The default rate of false alarms of a Z-test.
 pub const FALSE_ALARMS: f64 = 1e-4;
 
-/// What of a frame may differ from its golden image. Every condition that is given has to hold, and no value may be infinite or not a number where the golden
-/// image's is finite.
+/// Differences of a frame from its golden image that are allowed. Every condition given has to
+/// hold, and values must be finite where the golden image's are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Tolerance {
     /// Nothing may differ: every channel of the golden image, bit for bit.
@@ -42,10 +42,10 @@ fn default_percentile() -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZTestLimit {
-    /// The probability that an image is called different though only its seed is, above 0 and below 1.
+    /// The probability that an image is called different though only its seed is.
     #[serde(default = "default_false_alarms")]
     pub false_alarms: f64,
-    /// The bias of the image's mean, as a share of it, that has to be found: a golden image that is too noisy for it is not made.
+    /// The bias of the mean to find, as a share of it: golden images must be that exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bias: Option<f64>,
 }
@@ -70,7 +70,7 @@ struct Table {
 }
 
 impl Tolerance {
-    /// Returns true if nothing but noise may differ, so that the verdict does not depend on the seed.
+    /// Is nothing but noise allowed to differ, so that the verdict does not depend on the seed?
     pub fn allows_other_seeds(&self) -> bool {
         self.z_test.is_some() && !self.exact && self.flip.is_none() && self.bad_pixels.is_none()
     }
@@ -125,7 +125,7 @@ impl<'de> Deserialize<'de> for Tolerance {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> Result<Tolerance, String> {
+    fn parse(text: &str) -> Result<Tolerance, String> {
         #[derive(serde::Deserialize)]
         struct File {
             tolerance: Tolerance,
@@ -135,12 +135,12 @@ mod tests {
 
     #[test]
     fn conditions() {
-        assert!(of("\"exact\"").unwrap().exact);
-        let z = of("\"z_test\"").unwrap();
+        assert!(parse("\"exact\"").unwrap().exact);
+        let z = parse("\"z_test\"").unwrap();
         assert_eq!(z.z_test, Some(ZTestLimit { false_alarms: FALSE_ALARMS, bias: None }));
-        assert_eq!(of("{ z_test = {} }").unwrap(), z);
+        assert_eq!(parse("{ z_test = {} }").unwrap(), z);
         assert!(z.allows_other_seeds() && !of("\"exact\"").unwrap().allows_other_seeds());
-        let both = of("{ flip = { max = 0.05 }, bad_pixels = 3 }").unwrap();
+        let both = parse("{ flip = { max = 0.05 }, bad_pixels = 3 }").unwrap();
         assert_eq!(both.flip, Some(FlipLimit { percentile: 99.0, max: 0.05 }));
         assert_eq!((both.bad_pixels, both.exact, both.z_test), (Some(3), false, None));
         for (text, says) in [

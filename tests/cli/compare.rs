@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde_json::Value;
+use skylit::output::picture::{Colour, Picture};
 use skylit::output::{self, Channel, Image, Samples};
 
 use crate::common::command::{device, fails, json, place, refuses, run, stderr};
@@ -98,9 +99,10 @@ fn images_that_do_not_fit_are_named() {
     let hdr = write(&dir, "hdr.exr", &[("Y", &|_| 3.0)], &[]);
     let depth = write(&dir, "depth.exr", &[("depth.Z", &|_| 3.0)], &[]);
     let png = place(&dir, "a.png");
-    output::png::write_grey(png.as_ref(), &[128; 32], 8, 4).unwrap();
+    let grey = |values: Vec<u8>, size| Picture::of_bytes(values, size, Colour::Grey).unwrap();
+    grey(vec![128; 32], [8, 4]).save(png.as_ref(), 90).unwrap();
     let small = place(&dir, "small.png");
-    output::png::write_grey(small.as_ref(), &[128; 16], 4, 4).unwrap();
+    grey(vec![128; 16], [4, 4]).save(small.as_ref(), 90).unwrap();
     fails(&run(&["compare", &a, &small]), 1, &["A (a.exr) against B (small.png)", "8x4 and 4x4"]);
     fails(&run(&["compare", &png, &hdr]), 64, &["differ in encoding", "8-bit sRGB", "up to 3"]);
     fails(&run(&["compare", &a, &depth]), 64, &["no colour", "depth.Z", "--channels"]);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
+use skylit::output::picture::{Colour, Picture};
 
 use crate::common::command::{assert_refusal, json, refuses, run, skylit};
 
@@ -170,7 +171,8 @@ fn one_record_for_a_check_that_fails() {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, grey: u8| {
         let file = dir.path().join(name);
-        skylit::output::png::write_grey(&file, &[grey; 16], 4, 4).unwrap();
+        let picture = Picture::of_bytes(vec![grey; 16], [4, 4], Colour::Grey).unwrap();
+        picture.save(&file, 90).unwrap();
         file
     };
     let (a, b) = (write("a.png", 10), write("b.png", 200));

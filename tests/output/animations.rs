@@ -162,7 +162,7 @@ fn frame_numbers() {
     let error = has("a.##.b.#.exr").unwrap_err();
     assert!(matches!(&error, Error::Usage(m) if m.contains("a.##.b.#.exr") && m.contains("one run of #")), "{error}");
     assert_eq!(error.exit_code(), 64);
-    let pattern = FramePattern::of(Path::new("x.###.png")).unwrap().unwrap();
+    let pattern = FramePattern::from_path(Path::new("x.###.png")).unwrap().unwrap();
     assert_eq!([8, 9, 10].map(|k| pattern.path(k)), ["x.008.png", "x.009.png", "x.010.png"].map(std::path::PathBuf::from));
 }
 

@@ -151,7 +151,7 @@ fn depth_grey() {
 
 #[test]
 fn unknown_extension_names_all() {
-    let message = ImageFormat::of(Path::new("a.bmp")).unwrap_err().to_string();
+    let message = ImageFormat::from_path(Path::new("a.bmp")).unwrap_err().to_string();
     assert!([".exr", ".png", ".jpg", ".webp"].iter().all(|e| message.contains(e)), "{message}");
     assert!(output::save(&sample(2, 2), Path::new("noextension")).is_err());
 }

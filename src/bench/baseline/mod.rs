@@ -1,4 +1,4 @@
-//! `--baseline`: the results of a run beside those of an earlier one, so that what became worse beyond noise is found.
+//! `--baseline`: results beside those of an earlier run, to find what is worse beyond noise.
 
 mod table;
 
@@ -13,7 +13,6 @@ use crate::measure::regression::{Judged, Judgement, RULE, judge};
 use crate::measure::stats::median;
 use crate::report::Part;
 
-/// An earlier record.
 #[derive(Clone, Debug)]
 pub struct Baseline {
     path: PathBuf,
@@ -31,10 +30,10 @@ pub struct BaselineReport {
     pub rule: &'static str,
     /// Results that both records have.
     pub compared: usize,
-    /// Those of them of which nothing can be said, because one of the records has a single measurement.
+    /// Results without a verdict, because one of the records has a single measurement.
     pub not_judged: usize,
-    /// Median over all repeated results of how much worse they are, as a share of the baseline: what all of them have in common is more likely the machine's
-    /// than the program's. `None` without any.
+    /// Median relative change for the worse over all repeated results, which is more likely the
+    /// machine's than the program's. `None` without any.
     pub typical_change: Option<f64>,
     /// Results that are worse beyond noise, the worst first.
     pub regressions: Vec<Change>,
@@ -53,9 +52,8 @@ pub struct BaselineReport {
 /// A result that changed beyond noise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// What it was measured of.
+    /// The row of the measurement.
     pub row: String,
-    /// Quantity and unit.
     pub quantity: String,
     /// Median of the baseline.
     pub before: f64,
@@ -68,12 +66,10 @@ pub struct Change {
 }
 
 impl Baseline {
-    /// Reads an earlier record.
     pub fn read(path: &Path) -> Result<Self> {
         Ok(Self { path: path.to_owned(), before: Record::read(path)? })
     }
 
-    /// Its file.
     pub fn file(&self) -> &Path {
         &self.path
     }
@@ -107,6 +103,8 @@ impl Baseline {
         let compared = |record: &'_ Record| -> Vec<Measurement> {
             record.measurements.iter().filter(|m| m.better != Better::Neither).cloned().collect()
         };
+
+        // Pairs measurements of the same row and title.
         let [befores, nows] = [compared(&self.before), compared(now)];
         let by_key = |all: &[Measurement]| -> HashMap<(String, String), usize> {
             all.iter().enumerate().map(|(k, m)| ((m.row(), m.title()), k)).collect()
@@ -119,6 +117,8 @@ impl Baseline {
             warnings: self.warnings(now),
             ..BaselineReport::default()
         };
+
+        // Judges every pair, and finds missing and new measurements.
         let mut changes = Vec::new();
         for before in &befores {
             let Some(k) = in_now.get(&(before.row(), before.title())) else {
@@ -168,7 +168,6 @@ impl Baseline {
 }
 
 impl BaselineReport {
-    /// All of it, for people.
     pub fn parts(&self) -> Vec<Part> {
         table::parts(self)
     }

@@ -7,7 +7,6 @@ use crate::report::{Cell, Part, Row, Table, format_number};
 /// Names of missing results that are printed; the record has all.
 const MAX_NAMES: usize = 12;
 
-/// All of it.
 pub fn parts(report: &BaselineReport) -> Vec<Part> {
     let single = match report.not_judged {
         0 => String::new(),

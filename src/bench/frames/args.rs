@@ -27,7 +27,7 @@ const QUICK_FRAMES: u32 = 16;
 const DEFAULT_REFERENCE_PATHS: u32 = 1024;
 /// The default with `--quick`.
 const QUICK_REFERENCE_PATHS: u32 = 128;
-/// Paths of a reference of a frame in motion, relative to those of a still camera: the errors are larger, and the references several.
+/// Share of a still reference's paths for frames in motion, whose errors and number are larger.
 const MOVING_SHARE: f64 = 0.25;
 /// Default timed updates of each acceleration structure.
 const DEFAULT_REPEATS: u32 = 9;
@@ -241,7 +241,7 @@ impl BenchFramesArgs {
     pub fn candidates(&self) -> Vec<&'static Candidate> {
         let is_wanted = |c: &&Candidate| {
             if self.presets.is_empty() {
-                // larsen's budget of rays is for ambient occlusion, and the reference is no preset to compare
+                // larsen's ray budget is for ambient occlusion, and the reference is no preset
                 let is_larsens = c.preset == Preset::LarsenFixed && !self.is_occlusion();
                 self.has(c) && c.preset != Preset::Reference && !is_larsens
             } else {

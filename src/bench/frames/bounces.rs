@@ -1,4 +1,4 @@
-//! Time of frames at 1 to 4 bounces, in the scenes of Coello (2024), whose frames are of one path per pixel, without any filter: beside plain accumulation.
+//! Time of frames at 1 to 4 bounces in the scenes of Coello (2024), one unfiltered path per pixel.
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
@@ -14,7 +14,8 @@ use crate::realtime::Settings;
 use crate::report::thousands;
 use crate::scene::{Environment, load};
 
-/// A scene, and frames per second of that work at 1, 2, ... bounces: 1920x1080 pixels on a GeForce RTX 2070 Max-Q, children of nodes in the order of the ray's signs.
+/// A scene and the published frames per second at 1, 2, ... bounces: 1920x1080 pixels, GeForce RTX
+/// 2070 Max-Q, nodes in the order of the ray's signs.
 struct PublishedScene {
     source: &'static str,
     fps: [Option<f64>; 4],
@@ -37,12 +38,9 @@ const SCENES: [PublishedScene; 5] = [
     spheres("builtin:spheres:1000", 410.76),
     spheres("builtin:spheres:10000", 264.68),
 ];
-/// With `--quick`.
 const QUICK: usize = 2;
-/// Frames of a run.
 const FRAMES: u32 = 24;
 
-/// Measures all of them.
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let args = session.args;
     let name = args.presets.first().map_or(OURS, String::as_str);

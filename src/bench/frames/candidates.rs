@@ -11,12 +11,10 @@ const THEIR_FALLOFF: f64 = 8.0;
 /// Ray length of that paper, in the same units.
 const THEIR_REACH: f64 = 100.0;
 
-/// A preset that is compared.
 #[derive(Debug)]
 pub struct Candidate {
     /// Name on the command line and in tables.
     pub name: &'static str,
-    /// Its settings.
     pub preset: Preset,
     /// Overrides the preset's technique.
     pub technique: Option<Technique>,
@@ -73,7 +71,8 @@ impl Occlusion {
         )))
     }
 
-    /// Settings with this occlusion. The length unit of the `larsen` pipeline, which traces its camera rays, is chosen so that its falloff, or its ray length, matches.
+    /// Settings with this occlusion. The length unit of the `larsen` pipeline is chosen so that its
+    /// falloff, or its ray length, matches.
     pub fn apply_to(&self, settings: Settings) -> Settings {
         let (radius, unit) = if self.binary {
             (self.reach, self.reach / THEIR_REACH)

@@ -1,4 +1,5 @@
-//! A sudden change, after which everything rests: the environment map is turned or a box appears (lag, ghosting), the camera steps aside (disocclusion).
+//! A sudden change, after which everything rests: the environment map is turned or a box appears
+//! (lag, ghosting), the camera steps aside (disocclusion).
 
 use glam::DVec3;
 
@@ -34,7 +35,6 @@ const MIN_FRAMES: u32 = 16;
 const STALE_AFTER: u32 = 8;
 /// Runs that never saw the old, which say how much chance does to a pixel.
 const FRESH_RUNS: u32 = 8;
-/// Axis of the record.
 const AXIS: &str = "frame after the change";
 /// Error of the first frame after a change.
 const FIRST_RMSE: Quantity = Quantity { name: "RMSE of the first frame", unit: "", better: Better::Less };
@@ -43,11 +43,10 @@ const LARSEN: &str = "larsen";
 
 /// A change: before and after it, in which pixels it is looked at.
 struct ChangeScene {
-    /// Part of the record.
     part: &'static str,
     /// Before it, from where the scene is seen.
     camera_before: CameraRecord,
-    /// After it.
+    /// The camera after it.
     camera: CameraRecord,
     reference: FrameReference,
     /// The reference before it; `None` where another camera saw it.
@@ -55,7 +54,7 @@ struct ChangeScene {
     mask: Option<Vec<f32>>,
 }
 
-/// What a preset showed after a change.
+/// The images of a preset after a change.
 struct ChangeRun {
     preset: &'static str,
     rmse: Vec<f64>,
@@ -130,8 +129,8 @@ fn sidestep(session: &mut FramesSession, view: &View, stage: &mut Stage) -> Resu
     measure_presets(session, scene, stage, &change, |_, _, _| Ok((Vec::new(), None)))
 }
 
-/// Presets in turn; those for which no time is left are left out. `apply` makes the scene what it is before or after the change, and returns what moved and the milliseconds
-/// that it took to bring the tracer up to date.
+/// Measures presets in turn, while time is left. `apply` changes the scene or changes it back, and
+/// returns what moved and the milliseconds of updating the tracer.
 fn measure_presets(
     session: &mut FramesSession,
     scene: &str,
@@ -263,11 +262,11 @@ fn measure_preset(
     Ok(run)
 }
 
-/// What of the old is in the frames after a change.
+/// The traces of the old in frames after a change.
 struct Lag {
     /// Beside what the preset itself ends at.
     left: LagCurve,
-    /// Beside frames of the same age without a past, which are as blurred and as noisy: what is remembered, and no more.
+    /// Lag beyond that of frames of the same age without a past, which are as blurred and as noisy.
     memory: LagCurve,
     ghosting: f64,
 }
@@ -299,8 +298,9 @@ impl Lag {
     }
 }
 
-/// Adds to `ghosting` how much of `old`, the reference before the change, an image shows. `settled` is what the image ends at when nothing changes any more: what
-/// is always wrong with it is no ghost. `mask`: a value a pixel, above 0 where pixels take part, with all channels of an image. `None` where nothing differs.
+/// Adds to `ghosting` the share of `old`, the reference before the change, in an image. `settled`
+/// is its final state, whose errors are no ghosts. `mask`: a value per pixel, above 0 where pixels
+/// take part. `None` where nothing differs.
 pub fn add_ghost(
     ghosting: &mut Ghosting,
     (image, settled): (&[f32], &[f32]),

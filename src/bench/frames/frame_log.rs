@@ -20,7 +20,7 @@ pub fn first_timed(frames: u32) -> usize {
     frames as usize / 2
 }
 
-/// Frames of a sequence in which its error is measured, counted from 0: in its second half, the last included.
+/// Frames whose error is measured: in the second half of a sequence, the last included.
 pub fn measured(frames: u32) -> Vec<u32> {
     let half = frames / 2;
     let mut at: Vec<u32> = (1..=REFERENCES).map(|k| frames - half + half * k / REFERENCES).map(|end| end.max(1) - 1).collect();
@@ -34,7 +34,6 @@ const SAMPLING: [&str; 6] = ["path_camera", "path_bounce", "path_shadow", "path_
 /// Times of a pass, or of one step of several launches of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
-    /// Name of the pass.
     pub pass: String,
     /// Device time over the timed frames, milliseconds.
     pub ms: Percentiles,
@@ -43,7 +42,6 @@ pub struct PassTime {
 /// Cost of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameCost {
-    /// Each pass.
     pub passes: Vec<PassTime>,
     /// All passes, on the device; 0 where the device has no clock.
     pub device_ms: Percentiles,
@@ -68,8 +66,7 @@ impl FrameCost {
         self.time().median
     }
 
-    /// Share of the device time that goes into passes that trace and average samples, rather than reuse those of earlier frames and of neighbours; `None` where it is
-    /// not known.
+    /// Share of device time in passes that trace and average new samples, if it is known.
     pub fn sampling_share(&self) -> Option<f64> {
         let is_sampling = |p: &&PassTime| SAMPLING.contains(&p.pass.as_str());
         let sampling: f64 = self.passes.iter().filter(is_sampling).map(|p| p.ms.median).sum();
@@ -95,18 +92,17 @@ impl FrameCost {
     }
 }
 
-/// Frames that were made.
 #[derive(Default)]
 pub struct FrameLog {
     frames: Vec<TimedFrame>,
 }
 
-/// What a frame takes that is like others, noise of the clock aside.
+/// The typical time of a frame like others, noise of the clock aside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TypicalFrame {
     /// By the clock, milliseconds.
     pub ms: f64,
-    /// Paths of a pixel, if its passes did nothing but trace: its own, in the time of all of its passes.
+    /// Paths of a pixel if the frame did nothing but trace, in the time of all of its passes.
     pub paths: f64,
 }
 
@@ -137,7 +133,6 @@ impl FrameLog {
         Ok(&self.frames[self.frames.len() - 1].stats)
     }
 
-    /// Number of frames so far.
     pub fn count(&self) -> usize {
         self.frames.len()
     }
@@ -154,12 +149,12 @@ impl FrameLog {
         self.frames.iter().map(seconds).collect()
     }
 
-    /// What a frame costs, of those from `first` on: the first ones compile and find their memory.
+    /// The cost of frames from `first` on: earlier ones compile and find their memory.
     pub fn cost(&self, first: usize) -> FrameCost {
         cost_of(&self.frames[first.min(self.frames.len())..].iter().collect::<Vec<_>>())
     }
 
-    /// What each frame takes, by the median of those that have as many samples; of those from `first` on, where there are any.
+    /// The time of each frame: the median of those with as many samples, from `first` on.
     pub fn typical(&self, first: usize) -> Vec<TypicalFrame> {
         let mut kinds: Vec<(u32, TypicalFrame)> = Vec::new();
         let of_frame = |frame: &TimedFrame| {

@@ -1,4 +1,4 @@
-//! The preset `balanced` beside the pipeline of Larsen (2019): rays and error of both, and how good it is when a frame may take as long.
+//! The preset `balanced` beside the pipeline of Larsen (2019), also in equal time.
 
 use super::candidates::Candidate;
 use super::frame_log::{FrameLog, first_timed};
@@ -25,7 +25,7 @@ const MAX_RAYS: u32 = 256;
 /// Times that the number is corrected by what the whole run took.
 const CORRECTIONS: u32 = 3;
 
-/// What still cameras say of both, in lines; nothing where one of them was not measured.
+/// Remarks on both at still cameras; none where one of them was not measured.
 pub fn remarks(results: &[StillResult]) -> Vec<String> {
     let mut lines = Vec::new();
     let raises = |r: &&StillResult| r.unfiltered.is_some_and(|u| r.settled.rmse > u.rmse);
@@ -58,8 +58,8 @@ pub fn remarks(results: &[StillResult]) -> Vec<String> {
     lines
 }
 
-/// Looks for the most rays per pixel with which a frame of ours, camera rays included, takes no longer than one of theirs, by the median of what they take, and adds its error to the record;
-/// nothing where one of the two was not measured or one ray takes longer already.
+/// Adds the error of our frames with the most rays per pixel that take no longer than one of
+/// theirs, by medians; nothing where one was not measured or a single ray takes longer.
 pub fn measure_equal_time(
     record: &mut Record,
     scene: &str,

@@ -1,6 +1,6 @@
-//! `skylit bench frames`: what frames in real time of any integrator cost and how far they are from converged images, preset by preset, beside plain accumulation in
-//! the same time: standing still, moving, and after changes; and what varies with one number. docs/bench-frames.md says what is measured and how, docs/bench-ao.md what ambient
-//! occlusion has besides.
+//! `skylit bench frames`: cost and error of frames in real time, preset by preset, beside plain
+//! accumulation in the same time: standing still, moving, after changes, and along series.
+//! docs/bench-frames.md and docs/bench-ao.md say what is measured and how.
 
 mod args;
 mod bounces;
@@ -27,7 +27,6 @@ use super::session::Session;
 use crate::error::Result;
 use crate::terminal::console::Failure;
 
-/// Measures, shows, writes.
 pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     args.check()?;
     let scenes = scenes::choose(args);

@@ -19,7 +19,7 @@ use crate::realtime::surface_masks;
 struct Moment {
     frame: u32,
     reference: FrameReference,
-    /// Where objects move: the reference of the frame before, and the pixels in which both show the same surface at rest.
+    /// With moving objects: the reference before, and pixels of the same surface at rest in both.
     before: Option<(FrameReference, Vec<f32>)>,
 }
 

@@ -1,4 +1,4 @@
-//! Other renderers beside a camera that stands still: images of paths, in the time that a preset takes.
+//! Other renderers beside a camera that stands still: images of paths in a preset's time.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -12,15 +12,14 @@ use crate::error::Result;
 use crate::measure::displayed::{FrameReference, ImageErrors};
 use crate::measure::plain_time::{PlainClock, PlainTime, TIMED_PATHS};
 
-/// Values per pixel.
 const CHANNELS: usize = 3;
 
-/// What a peer renders a scene with.
+/// The images of a peer of a scene.
 pub struct PeerImages {
-    /// Its place among the peers.
+    /// The index of the peer.
     peer: usize,
     kernel: String,
-    /// Name of both.
+    /// The name of both.
     title: String,
     size: [u32; 2],
     seed: u32,
@@ -30,7 +29,6 @@ pub struct PeerImages {
     images: HashMap<u32, Image>,
 }
 
-/// An image that was rendered.
 #[derive(Clone, Copy)]
 struct Image {
     ms: f64,
@@ -42,7 +40,7 @@ const TRIES: usize = 3;
 /// Relative difference from the right number of paths that is small enough.
 const NEAR: f64 = 0.05;
 
-/// Gives all peers a scene, has them render their references, and takes their times. Those that fail are left out with a note.
+/// Gives all peers a scene, and takes references and times. Those that fail are left out.
 pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -> Result<Vec<PeerImages>> {
     let mut images = Vec::new();
     for peer in 0..session.peers.len() {
@@ -56,7 +54,8 @@ pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -
     Ok(images)
 }
 
-/// Adds to the record images of every peer in the time of so many frames of a preset, `(frames, milliseconds)`. One that fails is left out from here on, with a note.
+/// Adds images of every peer in the time of frames of a preset, `(frames, milliseconds)`. One that
+/// fails is left out from here on.
 pub fn render_beside(
     session: &mut FramesSession,
     (scene, preset): (&str, &str),
@@ -135,7 +134,7 @@ impl PeerImages {
         clock.take(|paths| Ok(peer.render(&self.kernel, paths, self.seed, self.size)?.0))
     }
 
-    /// The image of as many paths as take so many milliseconds. Those of many paths take less time for each than the few that the clock is of.
+    /// The image of as many paths as take `ms`. Many paths take less time each than the timed few.
     fn image_in(&mut self, peer: &mut Peer, time: PlainTime, ms: f64) -> Result<PlainImage, PeerError> {
         let mut paths = time.paths_in(ms);
         for _ in 0..TRIES {

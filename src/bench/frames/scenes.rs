@@ -1,4 +1,4 @@
-//! Which scenes are measured, what lights them, from where they are seen, and what the moving camera goes round.
+//! The measured scenes, with their lights, views, and the centres of moving cameras.
 
 use glam::{DAffine3, DVec3};
 
@@ -16,34 +16,32 @@ use crate::settings::Capability;
 
 /// The built-in atrium at night, with one lamp.
 const INTERIOR: &str = "interior";
-/// Its lamp: a small emitter.
+/// The lamp of a scene: a small emitter.
 const LAMP: &str = "sphere position=-4,2.6,0.6 radius=0.12 radiance=600";
 /// A room in which a box is moved about.
 const ROOM: &str = "room";
 /// Built-in scenes of the default list.
 const BUILTIN: [&str; 5] =
     ["builtin:cornell-box", "builtin:cornell-mirror", "builtin:cornell-glass-sphere", INTERIOR, "builtin:parade"];
-/// With `--quick`.
 const QUICK: [&str; 2] = ["builtin:cornell-box", "builtin:parade"];
-/// Those of ambient occlusion, after the well-known ones.
+/// Scenes of ambient occlusion, after the well-known ones.
 const OCCLUSION: [&str; 4] = ["builtin:terrain:2450000", "builtin:instances:25000000", ROOM, "builtin:parade"];
-/// With `--quick`.
 const QUICK_OCCLUSION: [&str; 3] = ["builtin:stairs", "builtin:instances:25000", ROOM];
 /// Well-known scenes of the default list.
 const FILES: [&WellKnownScene; 2] = [&SPONZA, &FLIGHT_HELMET];
 /// Material of the surface that covers Sponza's court: it is left out, so that the sun gets in.
 const COVER: &str = "None";
-/// How far ahead of a camera inside of its scene the point is that it goes round, diagonals of the scene's bounds: it is to stay clear of walls.
+/// Distance to the point that a camera within its scene goes round, in diagonals: clear of walls.
 const AHEAD: f64 = 0.05;
 
 /// Scenes to measure.
 pub fn choose(args: &BenchFramesArgs) -> SceneList {
     match args.scenes.as_slice() {
-        [] if args.common.quick && args.is_occlusion() => SceneList::of(&QUICK_OCCLUSION),
-        [] if args.common.quick => SceneList::of(&QUICK),
-        [] if args.is_occlusion() => SceneList::well_known(&WELL_KNOWN).then(SceneList::of(&OCCLUSION)),
-        [] => SceneList::of(&BUILTIN).then(SceneList::well_known(&FILES)),
-        named => SceneList::of(named),
+        [] if args.common.quick && args.is_occlusion() => SceneList::from_sources(&QUICK_OCCLUSION),
+        [] if args.common.quick => SceneList::from_sources(&QUICK),
+        [] if args.is_occlusion() => SceneList::well_known(&WELL_KNOWN).then(SceneList::from_sources(&OCCLUSION)),
+        [] => SceneList::from_sources(&BUILTIN).then(SceneList::well_known(&FILES)),
+        named => SceneList::from_sources(named),
     }
 }
 
@@ -52,15 +50,12 @@ pub fn check(source: &str) -> Result<()> {
     if [INTERIOR, ROOM].contains(&source) { Ok(()) } else { check_exists(source) }
 }
 
-/// A scene ready to be measured.
 pub struct FramesScene {
-    /// In tables.
     pub name: String,
-    /// The scene, lit.
     pub scene: Scene,
-    /// From where it is seen.
+    /// The camera.
     pub views: Vec<View>,
-    /// What lights it, in words.
+    /// The lights, in words.
     pub light: String,
     /// How far ambient occlusion reaches, scene units.
     pub reach: f64,
@@ -68,13 +63,11 @@ pub struct FramesScene {
     pub mover: Option<Mover>,
 }
 
-/// A camera.
 pub struct View {
     /// In tables, the name of the scene included.
     pub name: String,
-    /// From where the scene is seen.
     pub camera: Camera,
-    /// What the moving camera goes round.
+    /// The centre of the moving camera.
     pub middle: DVec3,
 }
 

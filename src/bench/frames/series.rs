@@ -41,6 +41,8 @@ pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -
         Series::Sampling => scenes.iter().take(SAMPLED).cloned().collect(),
         Series::Rays | Series::Resolution => scenes.iter().take(1).cloned().collect(),
     };
+
+    // Measures the first view of each scene, at one or all sizes.
     for (k, source) in sources.iter().enumerate() {
         if k > 0 && session.is_over() {
             session.leave_out(source);
@@ -141,7 +143,7 @@ fn measure_sequences(session: &mut FramesSession, scene: &str, stage: &mut Stage
         runs.push((sequence, still::run(stage, candidate, settings, &reference, frames, None)?));
     }
 
-    // all of them get as long as the quickest needs, every frame at its median price: single ones are too noisy to be added
+    // as long as the quickest needs, each frame at its median price: single ones are too noisy
     let price = |run: &StillRun| run.log.cost(first_timed(frames)).ms();
     let done = runs.iter().map(|(_, run)| price(run)).fold(f64::INFINITY, f64::min) * f64::from(frames);
     for (sequence, run) in &runs {

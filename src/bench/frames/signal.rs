@@ -1,4 +1,4 @@
-//! The signal that frames carry, radiance or ambient visibility: who makes frames of it, and who makes images of independent samples, plain and converged.
+//! Radiance or ambient visibility: makers of its frames, and of plain and converged images.
 
 use std::time::Instant;
 
@@ -28,16 +28,16 @@ const MAX_PATHS: u32 = 1 << 16;
 /// Occlusion rays of a pixel in one launch at most.
 const MAX_RAYS: u32 = 256;
 
-/// What frames of one scene show.
+/// The signal in frames of one scene.
 pub struct Signal {
     settings: RenderSettings,
     size: [u32; 2],
-    /// Of ambient occlusion.
     occlusion: Option<Occlusion>,
 }
 
 impl Signal {
-    /// What the arguments ask for, in an image of this size; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
+    /// The requested signal in an image of this size; occlusion up to `reach` scene units, paths of
+    /// at most `bounces` (`None`: the integrator's).
     pub fn new(args: &BenchFramesArgs, size: [u32; 2], reach: f64, bounces: Option<u32>) -> Result<Self> {
         let mut settings = RenderSettings { integrator: Some(args.integrator()), ..RenderSettings::default() };
         settings.image.size = Some(size);
@@ -53,7 +53,6 @@ impl Signal {
         Ok(Self { settings, size, occlusion })
     }
 
-    /// Number of values per pixel.
     pub fn channels(&self) -> usize {
         if is_ambient_occlusion(self.settings.integrator()) { 1 } else { 3 }
     }
@@ -86,7 +85,7 @@ impl Signal {
         Ok(frame_streams(&self.settings, &self.preset_settings(Preset::Balanced, None)?))
     }
 
-    /// Makes frames of a preset with these settings, which are [`Signal::frame_settings`] of it or near them.
+    /// Makes frames of a preset with settings like its [`Signal::frame_settings`].
     pub fn realtime(
         &self,
         tracer: &Tracer,
@@ -118,20 +117,16 @@ impl Signal {
     }
 }
 
-/// Makes images of independent samples: paths as stills have them, or occlusion rays of frames without history and filter.
+/// Makes images of independent samples: paths of stills, or unfiltered occlusion without history.
 pub enum Sampler {
-    /// Radiance.
     Paths {
-        /// What traces them.
         integrator: Box<PathIntegrator>,
-        /// Its options.
         options: PathOptions,
     },
     /// Ambient visibility.
     Rays {
         /// Settings of a frame, but for the number of rays.
         settings: Settings,
-        /// Pixels.
         size: [u32; 2],
     },
 }
@@ -203,18 +198,17 @@ pub struct EqualTime {
 }
 
 impl EqualTime {
-    /// Of these frames, at least one.
+    /// The time of these frames, at least one.
     pub fn new(plain: PlainTime, frames: Vec<TypicalFrame>) -> Self {
         Self { plain, frames }
     }
 
-    /// Time of plain accumulation.
     pub fn plain(&self) -> PlainTime {
         self.plain
     }
 
-    /// As many paths as fit into the time of the first frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
-    /// and many paths at once cost less.
+    /// As many paths as fit into the time of the first frames, in stills or in frames, whichever
+    /// are more: images cost more than their paths, and many paths at once cost less.
     pub fn paths(&self, frames: u32) -> u32 {
         // plain accumulation is timed by the clock, too
         self.plain.paths_in(self.ms(frames)).max(self.first(frames).iter().map(|f| f.paths).sum::<f64>() as u32)

@@ -1,4 +1,4 @@
-//! A scene on the device, with all that makes images of it: frames of presets, plain accumulation, converged images.
+//! A scene on the device, with makers of its images: presets, plain accumulation, converged images.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -34,7 +34,6 @@ pub const TIMED_IMAGES: u32 = 9;
 /// How far the environment map turns in a frame, degrees: as far as the camera on its orbit.
 pub const DEGREES_PER_FRAME: f64 = 0.5;
 
-/// What moves.
 pub enum Motion<'a> {
     /// The camera goes round a point.
     Orbit(Orbit),
@@ -47,7 +46,6 @@ pub enum Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// In records.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Orbit(_) => "orbit",
@@ -68,7 +66,6 @@ impl Motion<'_> {
 pub struct PlainImage {
     /// Paths per pixel, at least one.
     pub paths: u32,
-    /// Its errors.
     pub errors: ImageErrors,
 }
 
@@ -86,9 +83,8 @@ impl PlainImage {
 pub struct DenoisedImage {
     /// Paths per pixel: at least one a frame.
     pub paths: u32,
-    /// Time of a frame: paths and denoiser. More than the preset's where the denoiser alone takes longer.
+    /// Time of a frame: paths and denoiser, perhaps more than the preset's.
     pub ms: f64,
-    /// Its errors.
     pub errors: ImageErrors,
 }
 
@@ -105,17 +101,14 @@ pub fn turned(map: &EnvironmentMap, degrees: f64) -> DMat3 {
     map.to_map * DMat3::from_rotation_y(-degrees.to_radians())
 }
 
-/// What is new in a frame.
 pub struct FrameInputs {
-    /// From where the scene is seen.
     pub camera: CameraRecord,
-    /// What has moved in it.
     pub moved: Vec<MovedBounds>,
     /// The rotation to the environment map, if it has turned.
     pub to_map: Option<DMat3>,
     /// The scene in its pose, if that moves lights.
     pub posed: Option<Arc<Scene>>,
-    /// What it took to bring the tracer up to date, where objects move.
+    /// The time of updating the tracer, where objects move.
     pub update_seconds: Option<f64>,
 }
 
@@ -129,15 +122,10 @@ impl FrameInputs {
     }
 }
 
-/// A scene on the device.
 pub struct Stage<'a> {
-    /// Holds the scene.
     pub tracer: Tracer,
-    /// What the tracer was built from.
     pub flat: &'a FlatScene<'a>,
-    /// From where it is seen.
     pub camera: &'a Camera,
-    /// Pixels.
     pub size: [u32; 2],
     /// Seed of the samples of frames.
     pub seed: u32,
@@ -185,12 +173,10 @@ impl<'a> Stage<'a> {
         Ok(stage)
     }
 
-    /// Values per pixel.
     pub fn channels(&self) -> usize {
         self.signal.channels()
     }
 
-    /// The camera that stands still.
     pub fn still_camera(&self) -> CameraRecord {
         self.camera_record(self.camera)
     }
@@ -248,7 +234,7 @@ impl<'a> Stage<'a> {
         self.tracer.update(&Changes { instances: vec![instance], ..Default::default() })
     }
 
-    /// Tells a dynamic scene that it stands still in the next frame: motion vectors are those since its last update.
+    /// Stops the motion of a dynamic scene: motion vectors are those since its last update.
     pub fn rest(&mut self) -> Result<()> {
         if self.tracer.is_dynamic() {
             self.tracer.update(&Changes::default())?;
@@ -261,7 +247,6 @@ impl<'a> Stage<'a> {
         self.sampler.turn_environment(to_map)
     }
 
-    /// Settings of a preset's frames.
     pub fn settings(&self, candidate: &Candidate) -> Result<Settings> {
         Ok(Settings { seed: self.seed, ..self.signal.frame_settings(candidate)? })
     }
@@ -271,12 +256,12 @@ impl<'a> Stage<'a> {
         self.realtime_with(candidate, self.settings(candidate)?)
     }
 
-    /// The same with other settings.
+    /// Makes frames of a preset with other settings.
     pub fn realtime_with(&self, candidate: &Candidate, settings: Settings) -> Result<Realtime> {
         self.signal.realtime(&self.tracer, self.flat, self.camera, candidate.preset, settings)
     }
 
-    /// The last of some frames, every one with all of its camera rays: the camera moves by less than a thousandth of a pixel.
+    /// The last of some frames, all with new camera rays: the camera moves by under 0.001 pixels.
     pub fn jittered_frames(&self, candidate: &Candidate, settings: Settings, frames: u32) -> Result<(Vec<f32>, FrameLog)> {
         let mut realtime = self.realtime_with(candidate, settings)?;
         let (mut log, camera) = (FrameLog::default(), self.still_camera());
@@ -286,7 +271,7 @@ impl<'a> Stage<'a> {
         Ok((realtime.result()?, log))
     }
 
-    /// What each pixel shows.
+    /// The surface in each pixel.
     pub fn surfaces(&self, camera: &CameraRecord) -> Result<Vec<Option<Surface>>> {
         let settings = Settings { primary: Some(Primary::Traced), ..Preset::Fast.settings() };
         let mut realtime = Realtime::new(&self.tracer, self.size, &settings, &[])?;
@@ -294,7 +279,7 @@ impl<'a> Stage<'a> {
         realtime.surfaces()
     }
 
-    /// What frames show of a scene that does not change, in each of so many from now on, without any past.
+    /// Frames of a scene at rest, each of the next ones without any past.
     pub fn frames_afresh(&self, realtime: &mut Realtime, camera: &CameraRecord, frames: u32) -> Result<Vec<Vec<f32>>> {
         realtime.reset();
         let mut log = FrameLog::default();
@@ -329,7 +314,6 @@ impl<'a> Stage<'a> {
         Ok(self.sampler.render(&self.tracer, camera, paths, seed)?.0)
     }
 
-    /// Takes the time of plain accumulation.
     pub fn time_plain(&mut self, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         self.sampler.time(&self.tracer, camera, clock)
     }
@@ -345,8 +329,9 @@ impl<'a> Stage<'a> {
         Ok(PlainImage { paths, errors: reference.errors_of(&self.plain(camera, paths, seed)?)? })
     }
 
-    /// Plain accumulation over `frames` frames in the time of a preset's, every one of them denoised, and the errors of the last. Feature images count where the camera
-    /// moves (`is_moving`): of one that stands still they are rendered once. `None` where Open Image Denoise is not there.
+    /// Plain accumulation over `frames` frames, each denoised, in a preset's time, and the last
+    /// errors. Feature images take time where the camera moves (`is_moving`). `None` without a
+    /// denoiser.
     pub fn denoised(
         &mut self,
         camera: &CameraRecord,
@@ -376,7 +361,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// The camera, but for less than a thousandth of a pixel in every second frame: enough that everything has to be looked at anew.
+/// The camera, moved by under 0.001 pixels in every second frame: nothing is reused as it is.
 fn jittered(camera: &CameraRecord, frame: u32) -> CameraRecord {
     let [width, height] = camera.view;
     CameraRecord { view: [if frame % 2 == 1 { width.next_up() } else { width }, height], ..*camera }

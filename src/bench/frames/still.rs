@@ -1,4 +1,4 @@
-//! A camera that stands still: time of a frame, errors as frames add up, flicker, and what ambient occlusion does at rest.
+//! A camera that stands still: time, errors as frames add up, flicker, and occlusion at rest.
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
@@ -12,7 +12,6 @@ use crate::measure::displayed::{Flicker, FlickerMeter, FrameReference, ImageErro
 use crate::measure::plain_time::{PlainClock, is_plain_timed};
 use crate::realtime::{Filter, FilterKind, Settings, Technique};
 
-/// Part of the record.
 pub const PART: &str = "still";
 /// Part of the record with frames that have all of their camera rays.
 pub const WITH_CAMERA_RAYS: &str = "still, camera rays";
@@ -25,11 +24,9 @@ const AT_REST: usize = 8;
 /// Frames that a history takes to fill, and some.
 const PATIENCE: u32 = 8;
 
-/// What the still camera shows of a preset.
+/// The results of a preset at the still camera.
 pub struct StillResult {
-    /// The preset.
     pub candidate: &'static Candidate,
-    /// A frame's.
     pub cost: FrameCost,
     /// A frame's with all of its camera rays; of ambient occlusion.
     pub camera_cost: FrameCost,
@@ -37,7 +34,6 @@ pub struct StillResult {
     pub settled: ImageErrors,
     /// The same before the filter; of ambient occlusion.
     pub unfiltered: Option<ImageErrors>,
-    /// RMSE after each frame.
     pub rmse: Vec<f64>,
     /// Occlusion rays traced until each frame is done.
     pub rays: Vec<u64>,
@@ -45,7 +41,6 @@ pub struct StillResult {
 
 /// Frames of a camera that stands still.
 pub struct StillRun {
-    /// What they cost.
     pub log: FrameLog,
     /// Differences of consecutive frames.
     flicker: FlickerMeter,
@@ -53,13 +48,13 @@ pub struct StillRun {
     pub errors: Vec<ImageErrors>,
     /// The same before the filter; of ambient occlusion.
     pub unfiltered: Vec<ImageErrors>,
-    /// RMSE after each frame.
     pub rmse: Vec<f64>,
     /// Rays traced until each frame is done.
     rays: Vec<u64>,
 }
 
-/// Measures a preset, and the peers `beside` it: errors are means over runs that differ in their samples alone. Time and flicker are those of the first.
+/// Measures a preset and the peers `beside` it: errors are means over runs with other samples, time
+/// and flicker those of the first.
 pub fn measure(
     session: &mut FramesSession,
     scene: &str,
@@ -175,7 +170,7 @@ pub fn points(frames: u32) -> impl Iterator<Item = u32> {
     (1..=frames).filter(move |f| f.is_power_of_two() || *f == frames)
 }
 
-/// Frames of a camera that stands still, from the first. `clock`: plain accumulation is timed beside them.
+/// Frames of a still camera, from the first. `clock`: plain accumulation is timed beside them.
 pub fn run(
     stage: &mut Stage,
     candidate: &Candidate,
@@ -187,10 +182,12 @@ pub fn run(
     let camera = stage.still_camera();
     let mut realtime = stage.realtime_with(candidate, settings)?;
     if clock.is_some() {
-        // a frame for nothing: the first takes longer than the same frame later, and would not count for plain accumulation, whose time is the median of several
+        // a frame for nothing: the first takes longer than the same frame later
         realtime.frame(&stage.tracer, &camera, &[])?;
         realtime.rewind();
     }
+
+    // Every frame costs time, and some are held against the reference.
     let mut run = StillRun {
         log: FrameLog::default(),
         flicker: FlickerMeter::new(frames),
@@ -221,7 +218,7 @@ pub fn run(
     Ok(run)
 }
 
-/// A preset of ambient occlusion until nothing is traced any more, and what a frame costs then; nothing of what never rests.
+/// A preset of ambient occlusion until nothing is traced any more, and the cost of frames then.
 pub fn measure_rest(
     session: &mut FramesSession,
     scene: &str,

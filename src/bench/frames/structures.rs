@@ -1,5 +1,4 @@
-//! How long acceleration structures take to be brought up to date: the top level when everything moves, a mesh when it deforms, by
-//! refitting and by building anew.
+//! Time to update acceleration structures: moving instances, a mesh refitted and rebuilt.
 
 use glam::{DAffine3, Vec3};
 
@@ -13,22 +12,19 @@ use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
 use crate::tracer::{BuildOptions, Changes, ComputeOptions, MeshChange, Needs, Tracer};
 
-/// 15 meshes as in the reference work, and one that is as large as the mean of its: 25.2 M triangles by 15.
+/// 15 meshes as in Larsen's work, and one of their mean size: 25.2 M triangles by 15.
 const SCENES: [&str; 2] = ["builtin:instances:25000000", "builtin:terrain:1680000"];
-/// With `--quick`.
 const QUICK: [&str; 2] = ["builtin:instances:25000", "builtin:terrain:1680"];
 /// Radians that every instance turns in an update.
 const TURN: f64 = 0.01;
 /// How far vertices go, by the diagonal of their mesh.
 const WAY: f32 = 1e-3;
-/// Part of the record.
 const PART: &str = "structures";
-/// Top levels of Larsen (2019), by million triangles and meshes: milliseconds on a GPU that he does not name; and the rest of what he says about structures.
+/// Top levels of Larsen (2019), by million triangles and meshes, on a GPU that he does not name;
+/// and the rest of what he says about structures.
 const LARSENS: &str = "Larsen: top level, ms: 4.9 M in 4 meshes 0.157, 6.7 M in 5 0.160, 8.6 M in 6 0.160, 25.2 M in 15 0.180; first build of 25.2 M 230 ms; updating a mesh was guessed at 100 to 200 ms, not measured";
-/// The mesh that deforms.
 const MESH: usize = 0;
 
-/// Measures all scenes.
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let sources = if session.args.common.quick { QUICK } else { SCENES };
     for (k, source) in sources.into_iter().enumerate() {

@@ -27,7 +27,6 @@ pub fn open_denoiser(session: &mut FramesSession) -> Option<Oidn> {
     }
 }
 
-/// Measures a scene.
 pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -> Result<()> {
     // the scene, with all that may move in it
     let args = session.args;

@@ -9,13 +9,10 @@ use crate::measure::stats::median;
 
 /// A sampling strategy of our own or a kernel of a peer, with a scene.
 pub struct Contestant<'a> {
-    /// In tables.
     pub name: String,
-    /// Index of its reference.
     pub reference: usize,
-    /// What renders.
     pub engine: Engine<'a>,
-    /// What was measured, by sample count.
+    /// Measurements by sample count.
     pub by_spp: Vec<SampleCount>,
     /// Sums of image - reference over all images, one for each repeat.
     biases: Vec<f64>,
@@ -24,9 +21,8 @@ pub struct Contestant<'a> {
 
 /// Images of one sample count.
 pub struct SampleCount {
-    /// Paths a pixel.
     pub spp: u32,
-    /// Of each image.
+    /// Seconds of each image.
     pub seconds: Vec<f64>,
     squares: Vec<f64>,
     bad: Vec<f64>,
@@ -39,7 +35,7 @@ impl<'a> Contestant<'a> {
         Self { name, reference, engine, by_spp: Vec::new(), biases: Vec::new(), longest_launch: None }
     }
 
-    /// Renders an image and measures it. Those of the warming round are held against the reference, too: their seeds are their own.
+    /// Renders an image and measures it, also in the warming round, whose seeds are its own.
     pub fn render(&mut self, peers: &mut [Peer], round: u32, spp: u32, references: &[PathReference]) -> Result<(), PeerError> {
         let image = self.engine.render(peers, spp, 1 + round)?;
         let reference = &references[self.reference];
@@ -69,7 +65,6 @@ impl<'a> Contestant<'a> {
         Ok(())
     }
 
-    /// What was found.
     pub fn finish(self, size: [u32; 2], references: &[PathReference]) -> ErrorCurve {
         let reference_mse = references[self.reference].rmse.powi(2);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;

@@ -1,4 +1,4 @@
-//! What images of a contestant say: error by sample count, and when an error is reached.
+//! Error of a contestant by sample count, and the time to reach an error.
 
 use crate::bench::record::{Record, Row, plain, quantity};
 use crate::measure::stats::{Percentiles, median};
@@ -11,7 +11,6 @@ pub const SPP: &str = "samples per pixel";
 /// Images of one sample count.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorPoint {
-    /// Paths a pixel.
     pub spp: u32,
     /// Wall seconds of each timed image, in the order of the rounds.
     pub seconds: Vec<f64>,
@@ -19,22 +18,21 @@ pub struct ErrorPoint {
     pub rmse: f64,
     /// The same of each image, those of the warming round included.
     pub rmse_repeats: Vec<f64>,
-    /// The reference's own error is more than half of what was measured: `rmse` is all of that, and the error is less.
+    /// The reference's own error is more than half of `rmse`, which overstates the contestant's.
     pub is_unsure: bool,
-    /// Share of pixels that are wrong to the eye: off by more than a tenth of white in any channel after 1 - exp(-radiance).
+    /// Share of pixels off by more than a tenth of white in any channel after 1 - exp(-radiance).
     pub bad_pixels: f64,
 }
 
-/// What one contestant did.
+/// The curve of one contestant.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorCurve {
-    /// In tables.
     pub name: String,
     /// Whether a peer rendered it.
     pub is_peers: bool,
     /// By sample count, ascending.
     pub points: Vec<ErrorPoint>,
-    /// Of all images: mean of image - reference, in standard errors of the repeats' means; `None` with fewer than three.
+    /// Mean of image - reference, in standard errors over repeats; `None` with fewer than three.
     pub bias_sigmas: Option<f64>,
     /// 10^6 paths a second at the greatest sample count.
     pub mpaths: f64,
@@ -65,7 +63,7 @@ pub enum TimeEstimate {
 }
 
 impl ErrorCurve {
-    /// Time at which the error falls to `rmse`: logarithmically between points; after the last one as for independent samples.
+    /// Time at which the error falls to `rmse`: interpolated, then as of independent samples.
     pub fn time_to(&self, rmse: f64) -> Option<TimeToError> {
         let points = self.points.iter().filter_map(|p| Some((median(&p.seconds)?, p.rmse)));
         let curve: Vec<(f64, f64)> = points.filter(|p| p.1.is_finite()).collect();

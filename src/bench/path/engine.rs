@@ -1,4 +1,4 @@
-//! What renders: a strategy of our own, or a kernel of a peer.
+//! Renderers: our own strategies, or kernels of a peer.
 
 use std::time::Instant;
 
@@ -32,36 +32,25 @@ pub struct TimedImage {
     pub longest_launch: Option<f64>,
 }
 
-/// What renders.
 pub enum Engine<'a> {
     /// One of our strategies.
-    Own {
-        /// What traces.
-        tracer: &'a Tracer,
-        /// From where.
-        camera: CameraRecord,
-        /// What renders.
-        integrator: Box<PathIntegrator>,
-    },
+    Own { tracer: &'a Tracer, camera: CameraRecord, integrator: Box<PathIntegrator> },
     /// A kernel of a peer that has the scene.
     Peer {
-        /// Its place among the peers.
+        /// The index of the peer.
         peer: usize,
-        /// As it calls it.
+        /// The peer's own name for it.
         kernel: String,
-        /// Pixels.
         size: [u32; 2],
     },
 }
 
 impl<'a> Engine<'a> {
-    /// One of our own.
     pub fn own(tracer: &'a Tracer, flat: &FlatScene, camera: CameraRecord, options: &PathOptions) -> Result<Self> {
         let integrator = Box::new(PathIntegrator::new(tracer, flat, options)?);
         Ok(Self::Own { tracer, camera, integrator })
     }
 
-    /// An image.
     pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<TimedImage, PeerError> {
         match self {
             Self::Own { tracer, camera, integrator } => {
@@ -81,7 +70,6 @@ impl<'a> Engine<'a> {
     }
 }
 
-/// A reference image.
 pub struct PathReference {
     /// Who rendered it: skylit, or the name of a peer.
     pub engine: String,
@@ -89,13 +77,12 @@ pub struct PathReference {
     pub image: Vec<f32>,
     /// Standard error of `image`, root mean square over pixels and channels.
     pub rmse: f64,
-    /// Paths a pixel.
     pub spp: u64,
-    /// Spent on it.
+    /// Seconds that it took.
     pub seconds: f64,
 }
 
-/// Renders the reference of an engine of this name for `limit` seconds. `advance` hears the share that is done.
+/// Renders the reference of an engine for `limit` seconds. `advance` hears the share that is done.
 pub fn render_reference(
     engine: &mut Engine,
     name: &str,

@@ -1,5 +1,5 @@
-//! `skylit bench path`: how the error of path-traced images falls with time, by sampling strategy and beside peers.
-//! docs/bench-path.md says what is measured and how.
+//! `skylit bench path`: error of path-traced images over time, by sampling strategy and beside
+//! peers. docs/bench-path.md says what is measured and how.
 
 mod args;
 mod contestant;
@@ -39,7 +39,6 @@ const REFERENCES: f64 = 0.4;
 /// Name of our own engine.
 const OWN: &str = "skylit";
 
-/// Measures, shows, writes.
 pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(args);
     // before anything that takes long
@@ -182,7 +181,7 @@ impl PathSession<'_> {
         render_reference(engine, name, peers, (limit, MAX_SPP), &mut advance)
     }
 
-    /// Everybody in turn, sample count by sample count: a warming round, which also finds how far to go, then the timed ones.
+    /// Runs contestants in turn for each sample count: a warming round, then timed ones.
     fn rounds(&mut self, scene: &str, contestants: &mut [Contestant], references: &[PathReference]) -> Result<()> {
         let rounds = self.args.repeats() + 1;
         for round in 0..rounds {

@@ -1,4 +1,4 @@
-//! What is said to a peer that renders paths: a scene in files, images back. docs/benchmarks.md has the protocol.
+//! Messages to a peer that renders paths: a scene in files, images back (docs/benchmarks.md).
 
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::Error;

@@ -30,20 +30,20 @@ const BALLS: [Ball; 4] = [
     Ball { name: "sphere-mirror", kind: MaterialKind::MetallicRoughness, metallic: 1.0, roughness: 0.0, color: 1.0 },
     Ball { name: "sphere-glass", kind: MaterialKind::Glass, metallic: 0.0, roughness: 0.0, color: 1.0 },
 ];
-/// Of the default list: a caustic of the sun through glass is what nobody here finds.
+/// Scenes of balls in the default list: nobody here finds a caustic of the sun through glass.
 const DEFAULT_BALLS: usize = 3;
 
-/// The built-in Cornell box, all of it Lambert's: engines agree about it to the last digit that noise lets them see.
+/// The built-in Cornell box, all Lambertian: engines agree about it to the last digit above noise.
 const CORNELL: &str = "cornell";
 
 /// Scenes to measure.
 pub fn choose(args: &BenchPathArgs) -> SceneList {
-    let balls = |count: usize| SceneList::of(&BALLS[..count].iter().map(|b| b.name).collect::<Vec<_>>());
-    let cornell = SceneList::of(&[CORNELL]);
+    let balls = |count: usize| SceneList::from_sources(&BALLS[..count].iter().map(|b| b.name).collect::<Vec<_>>());
+    let cornell = SceneList::from_sources(&[CORNELL]);
     match args.scenes.as_slice() {
         [] if args.common.quick => cornell.then(balls(1)),
         [] => cornell.then(SceneList::well_known(&FILES)).then(balls(DEFAULT_BALLS)),
-        named => SceneList::of(named),
+        named => SceneList::from_sources(named),
     }
 }
 
@@ -53,13 +53,10 @@ pub fn check(source: &str) -> Result<()> {
     if own { Ok(()) } else { check_exists(source) }
 }
 
-/// A scene ready to be measured.
 pub struct PathScene {
-    /// The scene, lit.
     pub scene: Scene,
-    /// From where it is seen.
     pub camera: Camera,
-    /// What surrounds it, in words.
+    /// The surroundings, in words.
     pub environment: String,
 }
 

@@ -1,4 +1,4 @@
-//! The peers file, which describes other tracers and renderers, and building them. docs/benchmarks.md describes both.
+//! The peers file, which describes other renderers, and building them (docs/benchmarks.md).
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -9,10 +9,10 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
-/// Default peers file.
 pub const DEFAULT: &str = "benches/peers.toml";
 
-/// The project's own peers file, and the files in its folder that its commands run or compile: a peers file runs commands, so by default only this one is taken.
+/// The project's own peers file, and the files that its commands run or compile: a peers file runs
+/// commands, so by default only this one is taken.
 const OWN: [(&str, &str); 3] = [
     ("peers.toml", include_str!("../../../benches/peers.toml")),
     ("peers/embree.cpp", include_str!("../../../benches/peers/embree.cpp")),
@@ -41,7 +41,6 @@ pub enum Measures {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PeerSpec {
-    /// In tables.
     pub name: String,
     /// Benchmark it takes part in.
     #[serde(default)]
@@ -55,9 +54,7 @@ pub struct PeerSpec {
     /// Command that builds it; nothing to build when empty.
     #[serde(default)]
     build: Vec<String>,
-    /// Command that runs it.
     pub run: Vec<String>,
-    /// Kernels to measure.
     pub kernels: Vec<String>,
     /// Kernels that ratios are relative to.
     #[serde(default)]
@@ -70,7 +67,8 @@ pub struct PeerSpec {
     folder: PathBuf,
 }
 
-/// The peers of a benchmark, from the requested file (`none`: no peers) or from [`DEFAULT`]; or the reason why there are none.
+/// The peers of a benchmark, from the requested file (`none`: no peers) or from [`DEFAULT`]; or the
+/// reason why there are none.
 pub fn choose(requested: Option<&str>, measures: Measures) -> Result<Result<Vec<PeerSpec>, String>> {
     let file = match requested {
         Some("none") => return Ok(Ok(Vec::new())),
@@ -150,7 +148,7 @@ impl PeerSpec {
         format!("peer '{}' is missing: {why}{needs}", self.name)
     }
 
-    /// The next command that is run for it, as the file has it: the one that builds it, where that is needed.
+    /// The next command for it, as in the file: the one that builds it, where that is needed.
     pub fn command_line(&self) -> String {
         let words = if self.is_built() { &self.run } else { &self.build };
         words.join(" ").replace(char::is_control, " ")
@@ -196,7 +194,7 @@ impl PeerSpec {
         word.replace("{dir}", &self.folder.display().to_string()).replace("{out}", &out.display().to_string())
     }
 
-    /// Builds to a temporary file and renames it, so that an interrupted build leaves no incomplete program.
+    /// Builds to a temporary file and renames it: interruptions leave no incomplete program.
     fn build_to(&self, out: &Path) -> Result<(), String> {
         let folder = out.parent().unwrap_or(Path::new("."));
         let cannot = |e: std::io::Error| format!("{}: {e}", folder.display());
@@ -211,7 +209,7 @@ impl PeerSpec {
             .map_err(|e| format!("`{}` does not run ({e})", words[0]))?;
         if !done.status.success() {
             let said = String::from_utf8_lossy(&done.stderr);
-            // the line that names the error; compilers say much besides, and linkers do not call theirs so
+            // the line that names the error, which linkers do not call so
             let names = |l: &&str| l.contains("error") || l.contains("cannot find");
             let line = said.lines().find(names).or_else(|| said.lines().next()).unwrap_or("no reason given");
             return Err(format!("building it failed ({})", line.trim()));

@@ -1,4 +1,4 @@
-//! A peer's process: driven by lines on its stdin, answering with JSON lines. docs/benchmarks.md has the protocol.
+//! A peer's process: lines on its stdin, answers in JSON lines (docs/benchmarks.md).
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
@@ -12,7 +12,6 @@ use super::file::PeerSpec;
 use crate::error::{Error, Result};
 use crate::terminal::interrupt;
 
-/// The protocol that we speak.
 const PROTOCOL: u64 = 1;
 /// Timeout of an answer. Building over 10^7 triangles takes seconds.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -45,7 +44,6 @@ impl PeerError {
 
 /// A running peer. `bench::rays` and `bench::path` add what is said to it.
 pub struct Peer {
-    /// From the peers file.
     pub spec: PeerSpec,
     /// As it introduces itself.
     pub title: String,
@@ -109,8 +107,8 @@ impl Peer {
                 Err(RecvTimeoutError::Disconnected) => {
                     // Ctrl-C reaches both of us
                     interrupt::check()?;
-                    let how = self.child.wait().map_or_else(|e| e.to_string(), |s| s.to_string());
-                    return Err(PeerError::Failed(format!("it ended ({how})")));
+                    let status = self.child.wait().map_or_else(|e| e.to_string(), |s| s.to_string());
+                    return Err(PeerError::Failed(format!("it ended ({status})")));
                 }
                 Err(RecvTimeoutError::Timeout) => {
                     interrupt::check()?;
@@ -131,7 +129,7 @@ impl Peer {
     /// Sends a command and waits for the answer.
     ///
     /// # Errors
-    /// [`PeerError::Failed`] when it says that it failed, ends, or says nothing for ten minutes; [`PeerError::Ours`] on Ctrl-C.
+    /// [`PeerError::Failed`] when it fails, ends, or is silent too long; [`PeerError::Ours`].
     pub fn ask(&mut self, command: &str) -> Result<Value, PeerError> {
         let sent = writeln!(self.stdin, "{command}").and_then(|()| self.stdin.flush());
         // one that has ended says so to `listen`

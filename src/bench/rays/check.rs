@@ -23,7 +23,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// What was found of a contestant: names of scene, stream, contestant, and of the one that it was compared with.
+    /// The findings about a contestant: names of scene, stream, contestant, and of its reference.
     pub fn new([scene, stream, contestant, reference]: [&str; 4], found: &Agreement, strict: bool) -> Self {
         let report = &found.report;
         Self {
@@ -51,13 +51,13 @@ impl Check {
         });
     }
 
-    /// Is it a failure? The reference is one of our own tracers: that its answers are wrong always is.
+    /// Is it a failure? One of our own tracers as the reference always counts.
     fn fails(&self) -> bool {
         self.strict && self.unexplained > 0 || self.reference_unexplained > 0
     }
 }
 
-/// An answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree.
+/// An unexplained answer is a failure, if it is ours or of a peer that has to agree.
 ///
 /// # Errors
 /// [`Error::CheckFailed`] that names the first.

@@ -15,14 +15,12 @@ use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
 pub struct OwnKernel {
     /// On the command line and in tables.
     pub name: &'static str,
-    /// Which tracer.
     pub tracer: TracerKind,
     /// Which kernel of the compute tracer.
     pub kernel: Kernel,
     /// On a CPU device, it traces one in this many rays.
     pub divisor: usize,
-    /// On a CPU device, it is skipped on scenes with more stored primitives, unless requested by name. For the kernel without a
-    /// hierarchy: with more primitives to test per ray.
+    /// Maximum of primitives on a CPU device, unless requested by name: brute force tests all.
     pub max_primitives: usize,
 }
 
@@ -67,7 +65,7 @@ enum Engine<'a> {
     Peer { peer: usize, kernel: String, flat: &'a FlatScene<'a> },
 }
 
-/// What building a contestant's hierarchy took.
+/// The cost of building a contestant's hierarchy.
 #[derive(Clone, Debug)]
 pub struct BuildCost {
     /// Seconds to build the hierarchy.
@@ -82,11 +80,9 @@ pub struct BuildCost {
 
 /// A contestant with a scene.
 pub struct Contestant<'a> {
-    /// In tables.
     pub name: String,
-    /// What building took.
     pub build: BuildCost,
-    /// Its answers have to agree with the reference.
+    /// Must its answers agree with the reference?
     pub strict: bool,
     /// Which kernel of the compute tracer it is.
     pub kernel: Option<Kernel>,
@@ -94,7 +90,6 @@ pub struct Contestant<'a> {
 }
 
 impl<'a> Contestant<'a> {
-    /// One of our own.
     pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
         let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
         let stats = tracer.stats();
@@ -134,7 +129,6 @@ impl<'a> Contestant<'a> {
         self.kernel != Some(Kernel::Packet) || set.is_coherent()
     }
 
-    /// The tracer, if it is our own.
     pub fn tracer(&self) -> Option<&Tracer> {
         match &self.engine {
             Engine::Own { tracer, .. } => Some(tracer),
@@ -142,7 +136,6 @@ impl<'a> Contestant<'a> {
         }
     }
 
-    /// The peer it belongs to.
     pub fn peer_index(&self) -> Option<usize> {
         match self.engine {
             Engine::Own { .. } => None,
@@ -184,7 +177,6 @@ impl<'a> Contestant<'a> {
 
 /// A contestant about to trace one stream again and again.
 pub struct PreparedRun<'c> {
-    /// Rays of a repeat.
     pub rays: usize,
     engine: PreparedEngine<'c>,
 }
@@ -203,7 +195,6 @@ pub struct RepeatTime {
 }
 
 impl PreparedRun<'_> {
-    /// One repeat.
     pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<RepeatTime, PeerError> {
         match &mut self.engine {
             PreparedEngine::Own(prepared) => {
@@ -218,7 +209,6 @@ impl PreparedRun<'_> {
         }
     }
 
-    /// Number of rays of the last repeat that hit something.
     pub fn hit_count(&self) -> Result<u64, Error> {
         match &self.engine {
             PreparedEngine::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),

@@ -1,5 +1,5 @@
-//! `skylit bench rays --edges`: rays aimed at shared edges and vertices of closed meshes, through our tracers and those of others. None may get through; and what is met is held against the
-//! double-precision oracle.
+//! `skylit bench rays --edges`: rays at shared edges and vertices of closed meshes, through all
+//! tracers. None may get through, and hits are held against the double-precision oracle.
 
 use super::args::RaySession;
 use super::contestant::Contestant;
@@ -30,15 +30,14 @@ const HARD: (u32, u32) = (7, 1000);
 const SCENE: &str = "closed meshes";
 const PART: &str = "rays at edges";
 
-/// What became of a contestant's rays at shared edges and vertices of closed meshes: how many met nothing, asked for any and for the closest hit; how many closest hits are the oracle's, are
-/// others that rounding allows (at an edge, either side of it, or none), and neither.
+/// The fates of a contestant's rays at shared edges and vertices of closed meshes: misses of any
+/// and of closest hits; closest hits that are the oracle's, that rounding allows, and neither.
 const COUNTS: [&str; 7] = ["meshes", "rays", "leaks, any", "leaks, closest", "agree", "ties", "unexplained"];
 
 /// Counts of a contestant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeCounts {
     contestant: String,
-    /// In the order of [`COUNTS`].
     counts: [u64; 7],
     /// Whether leaks and unexplained answers are a failure: those of the compute tracer are.
     is_watertight: bool,

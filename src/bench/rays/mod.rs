@@ -1,5 +1,5 @@
-//! `skylit bench rays`: ray rates of all contestants. Their repeats are interleaved, so that a temporary slowdown of the machine affects
-//! all of them.
+//! `skylit bench rays`: ray rates of all contestants, in interleaved repeats, so that slowdowns of
+//! the machine affect all of them.
 
 mod args;
 mod check;
@@ -44,7 +44,7 @@ const VISITED_RAYS: usize = 20_000;
 /// Maximum number of primitives of scenes whose hierarchy is rebuilt for counting visits.
 const MAX_VISITED_PRIMITIVES: usize = 2_000_000;
 
-/// What became of answers that were held against others.
+/// The outcomes of comparing answers.
 #[derive(Default)]
 struct Findings {
     checks: Vec<Check>,
@@ -53,7 +53,7 @@ struct Findings {
     baselines: Vec<String>,
 }
 
-/// What a contestant did with a stream.
+/// The results of a contestant with a stream.
 struct StreamRun {
     name: String,
     is_peers: bool,
@@ -156,6 +156,8 @@ impl RaySession<'_> {
             self.note(format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));
         }
         interrupt::check()?;
+
+        // Builds the contestants, and makes the rays that they are given.
         let flat = FlatScene::new(&loaded.scene);
         let contestants = self.contestants(source, &flat)?;
         let Some(tracer) = contestants.iter().find_map(Contestant::tracer) else {
@@ -178,6 +180,8 @@ impl RaySession<'_> {
         let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= MAX_VISITED_PRIMITIVES;
         let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
         let counter = if counted { VisitCounter::new(&flat) } else { None };
+
+        // Measures stream by stream, as long as there is time.
         let mut traced: Vec<&StreamKind> = Vec::new();
         for (k, stream) in requested.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
@@ -252,7 +256,7 @@ impl RaySession<'_> {
         self.args.streams.is_empty() || self.args.streams.iter().any(|s| s == stream.name)
     }
 
-    /// Builds the contestants of a scene. At least one is a kernel of skylit, which generates the rays.
+    /// Builds the contestants of a scene. At least one is a kernel of skylit, which makes the rays.
     fn contestants<'f>(&mut self, source: &str, flat: &'f FlatScene<'f>) -> Result<Vec<Contestant<'f>>> {
         let mut out = Vec::new();
         let mut refused = None;
@@ -268,7 +272,7 @@ impl RaySession<'_> {
             };
             match made {
                 Ok(c) => out.push(c),
-                // one that the scene is too large for, or that the device does not run, does not stop the others
+                // a device or a scene that one contestant cannot take does not stop the others
                 Err(e @ (Error::OutOfMemory(_) | Error::Device(_) | Error::Scene(_))) => {
                     self.note(format!("{source}: '{}' left out: {e}", own.name));
                     refused.get_or_insert(e);
@@ -280,6 +284,8 @@ impl RaySession<'_> {
         if let (true, Some(why)) = (out.is_empty(), refused) {
             return Err(why);
         }
+
+        // Peers build from the same triangles; they know no alpha masks.
         let masked = flat.has_alpha();
         for index in 0..self.peers.len() {
             let spec = self.peers[index].spec.clone();
@@ -331,6 +337,8 @@ impl RaySession<'_> {
         for c in contestants {
             runs.push(c.prepare(stream.set, rays, stream.mode)?);
         }
+
+        // Traces in rounds, without contestants that have failed.
         let mut times: Vec<Vec<RepeatTime>> = contestants.iter().map(|_| Vec::new()).collect();
         let repeats = self.args.repeats();
         for round in 0..=repeats {
@@ -358,6 +366,8 @@ impl RaySession<'_> {
                 break;
             }
         }
+
+        // Collects times and hits of those that are left.
         let mut results = Vec::new();
         for (k, contestant) in contestants.iter().enumerate() {
             if failed[k] || times[k].is_empty() {
@@ -391,6 +401,8 @@ impl RaySession<'_> {
             return Ok(());
         };
         self.phase(format!("{source}: checking"));
+
+        // Compares stream by stream, as long as there is time.
         let pairs = (streams.len() * contestants.len()).max(1) as f64;
         for (done, stream) in streams.iter().enumerate() {
             if self.is_late() {

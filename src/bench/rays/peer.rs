@@ -1,4 +1,4 @@
-//! Protocol of peers that trace rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
+//! Messages to peers that trace rays: scenes and rays in files, seconds and hits back.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -80,8 +80,7 @@ fn mode_name(mode: Mode) -> &'static str {
     }
 }
 
-/// Maps TLAS instance and group primitive to scene instance and mesh primitive. Invalid ids are unchanged, so that the check reports
-/// them.
+/// Maps instance and group primitive to scene instance and mesh primitive, but for invalid ids.
 fn rename(flat: &FlatScene, hit: &mut Hit) {
     let Some(entry) = flat.instances.get(hit.instance as usize) else { return };
     let group = &flat.groups[entry.group];
@@ -95,7 +94,7 @@ fn rename(flat: &FlatScene, hit: &mut Hit) {
     }
 }
 
-/// Writes the BLAS geometry and TLAS instances that skylit's tracers build over, with the same vertices as in device memory.
+/// Writes the geometry and instances that our tracers build over, with device memory's vertices.
 fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
     let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));

@@ -23,7 +23,6 @@ const BUILTIN: [&str; 9] = [
     "builtin:instances:25000000",
 ];
 
-/// With `--quick`.
 const QUICK: [&str; 5] = [
     "builtin:terrain:1000",
     "builtin:terrain:10000",
@@ -35,17 +34,14 @@ const QUICK: [&str; 5] = [
 /// Scenes to measure: those that are named, else the default ones; fewer if it is to be `quick`.
 pub fn choose(named: &[String], quick: bool) -> SceneList {
     match named {
-        [] if quick => SceneList::of(&QUICK),
-        [] => SceneList::well_known(&WELL_KNOWN).then(SceneList::of(&BUILTIN)),
-        named => SceneList::of(named),
+        [] if quick => SceneList::from_sources(&QUICK),
+        [] => SceneList::well_known(&WELL_KNOWN).then(SceneList::from_sources(&BUILTIN)),
+        named => SceneList::from_sources(named),
     }
 }
 
-/// A scene ready to be measured.
 pub struct RayScene {
-    /// The scene.
     pub scene: Scene,
-    /// From where it is seen.
     pub camera: Camera,
     /// Length of ambient occlusion rays, scene units; may be infinite.
     pub ao_radius: f64,
@@ -55,7 +51,8 @@ pub struct RayScene {
     pub well_known: Option<&'static str>,
 }
 
-/// Loads a scene and chooses its view. `keep_alpha`: alpha masks do not count as opaque; `ao_radius`: instead of the scene's.
+/// Loads a scene and chooses its view. `keep_alpha`: alpha masks do not count as opaque;
+/// `ao_radius`: instead of the scene's.
 pub fn load(source: &str, keep_alpha: bool, ao_radius: Option<f64>, aspect: f64) -> Result<RayScene> {
     let mut scene = load::load(source)?;
     if !keep_alpha {

@@ -7,13 +7,10 @@ use crate::integrators::rays::Mode;
 pub struct StreamKind {
     /// On the command line and in tables.
     pub name: &'static str,
-    /// Its rays.
     pub set: RaySet,
-    /// What is asked.
     pub mode: Mode,
 }
 
-/// All streams.
 pub const STREAMS: [StreamKind; 5] = [
     StreamKind { name: "primary", set: RaySet::Primary, mode: Mode::Closest },
     StreamKind { name: "ao-any", set: RaySet::Occlusion, mode: Mode::Any },

@@ -88,12 +88,12 @@ pub struct RenderArgs {
 impl RenderArgs {
     /// Returns true if an .exr is written.
     pub fn writes_exr(&self) -> bool {
-        self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
+        self.output.iter().any(|p| ImageFormat::from_path(p).is_ok_and(|f| f == ImageFormat::Exr))
     }
 
     /// Returns true if a picture or an animation is written.
     pub fn writes_picture(&self) -> bool {
-        self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(ImageFormat::is_picture))
+        self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture))
     }
 
     /// Returns true if channels of frames in real time are needed, not only what they display.
@@ -144,7 +144,7 @@ impl RenderArgs {
         // options of stills alone
         let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));
-        let formats = images.map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
+        let formats = images.map(|p| ImageFormat::from_path(p)).collect::<Result<Vec<_>>>()?;
         let of_stills = [
             (self.keep_partial, "--keep-partial", "leave it out"),
             (self.depth_image.is_some(), "--depth-image", "use --aov depth"),
@@ -164,7 +164,7 @@ impl RenderArgs {
             return wrong("--aov needs an .exr output: pictures hold colour only".into());
         }
         if let Some(path) = &self.depth_image
-            && !matches!(ImageFormat::of(path)?, ImageFormat::Png | ImageFormat::Exr)
+            && !matches!(ImageFormat::from_path(path)?, ImageFormat::Png | ImageFormat::Exr)
         {
             return wrong(format!("--depth-image {}: the name must end in .png or .exr", path.display()));
         }
@@ -200,7 +200,7 @@ impl RenderArgs {
             return wrong("--resumable needs an .exr output: pictures hold colour only".into());
         }
         match &film.resume {
-            Some(path) if ImageFormat::of(path).ok() != Some(ImageFormat::Exr) => {
+            Some(path) if ImageFormat::from_path(path).ok() != Some(ImageFormat::Exr) => {
                 wrong(format!("--resume {}: only an .exr that was rendered with --resumable can be resumed", path.display()))
             }
             _ => Ok(()),
@@ -210,7 +210,7 @@ impl RenderArgs {
     /// The files that it reads, as far as the command line tells, and those that it will write.
     ///
     /// # Errors
-    /// Those of [`FramePattern::of`], and [`Error::Usage`] for a file that would replace the one of
+    /// Those of [`FramePattern::from_path`], and [`Error::Usage`] for a file that would replace the one of
     /// `--resume` and is no image.
     pub fn plan(&self, defaults: &[DefaultsReport]) -> Result<FilePlan> {
         let (mut plan, settings) = (FilePlan::default(), &self.settings);
@@ -235,7 +235,7 @@ impl RenderArgs {
         let last = range.end.min(range.first.saturating_add(MAX_PLANNED_FRAMES));
         let is_sequence = settings.realtime_setting().is_some() || settings.is_still_sequence();
         for path in &self.output {
-            match FramePattern::of(path)?.filter(|_| is_sequence) {
+            match FramePattern::from_path(path)?.filter(|_| is_sequence) {
                 Some(pattern) => (range.first..last).for_each(|n| plan.writes("-o", pattern.path(u64::from(n)))),
                 None => plan.writes("-o", path),
             }

@@ -44,7 +44,7 @@ impl FrameFiles {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
         for path in files {
-            if ImageFormat::of(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }
+            if ImageFormat::from_path(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }
         }
         let delay = Delay::of_rate(fps)?;
         let animation = Animation { size, colour: on_background(colour, settings.background), frames, delay };
@@ -77,7 +77,7 @@ impl FrameFiles {
             let deep = contents
                 .deep
                 .as_ref()
-                .filter(|_| self.settings.has_deep_png() && ImageFormat::of(&path).is_ok_and(|f| f == ImageFormat::Png));
+                .filter(|_| self.settings.has_deep_png() && ImageFormat::from_path(&path).is_ok_and(|f| f == ImageFormat::Png));
             match deep {
                 Some(image) => {
                     let image = if self.settings.background.is_some() { &picture::unassociated(image) } else { image };

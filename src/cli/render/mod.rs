@@ -328,7 +328,7 @@ fn interval_path(path: &Path, samples: u32) -> PathBuf {
 
 fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2], files: &FileSettings) -> Result<()> {
     let depth: Vec<f32> = pixels.iter().map(|p| p.depth).collect();
-    if ImageFormat::of(path)? == ImageFormat::Exr {
+    if ImageFormat::from_path(path)? == ImageFormat::Exr {
         let channels = vec![Channel { name: "depth.Z".into(), samples: Samples::F32(depth) }];
         return output::save(&Image { width: size[0], height: size[1], channels, metadata: Vec::new() }, path);
     }

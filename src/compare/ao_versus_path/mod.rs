@@ -1,12 +1,16 @@
-//! Is ambient occlusion a stand-in for global illumination (Larsen 2019)? Of a view, how far is what renderers make of it (the integrator `lit`) from path tracing, with the radius, falloff
-//! and ambient colour that fit best?
+//! Is ambient occlusion a stand-in for global illumination (Larsen 2019)? How far is the integrator
+//! `lit` from path tracing in a view, with the radius, falloff and ambient colour that fit best?
 //!
-//! `lit` is D + A V albedo: direct light, and an ambient radiance A that reaches surfaces by their ambient visibility V of a radius and falloff. Path tracing is T. The ambient
-//! light is to be g = T - D, so the search minimizes the mean of (A V albedo - g)^2 over the pixels that show surfaces and over linear RGB. All occlusion rays
-//! are traced once, to their nearest hits (`samples`), and every radius and falloff is evaluated from these distances (`sums`, `search`).
+//! `lit` is D + A V albedo: direct light, and an ambient radiance A by the ambient visibility V of
+//! a radius and falloff. Path tracing is T. The search minimizes the mean of (A V albedo - g)^2, g
+//! = T - D, over linear RGB and pixels of surfaces. All occlusion rays are traced once, to their
+//! nearest hits (`samples`), from whose distances every radius and falloff follows (`sums`,
+//! `search`).
 //!
-//! Where the scene has an environment there are two questions: ambient light in place of bounces, with the environment traced as direct light; and in place of environment and bounces,
-//! which is what renderers do that cannot trace the environment. A third compares V itself with `ao-sky`, grey surfaces under a white sky.
+//! Where the scene has an environment there are two questions: ambient light in place of bounces,
+//! with the environment traced as direct light; and in place of environment and bounces, as
+//! renderers do that cannot trace it. A third compares V with `ao-sky`, grey surfaces under a white
+//! sky.
 
 pub mod page;
 mod references;
@@ -36,20 +40,16 @@ use report::fit_record;
 use search::{Found, search};
 use sums::Target;
 
-/// What is compared.
 #[derive(Clone, Debug)]
 pub struct AoVersusPathSettings {
-    /// Image size in pixels.
     pub size: [u32; 2],
     /// Paths per pixel of each reference, in two halves of at least one.
     pub spp: u32,
     /// Occlusion rays per pixel, in two halves of at least one.
     pub ao_samples: u32,
-    /// Seed of the sampler.
     pub seed: u32,
     /// Meaning of the scene's file.
     pub scene: SceneSettings,
-    /// The camera.
     pub camera: CameraSettings,
     /// Lights in addition to the scene's.
     pub lighting: LightingSettings,
@@ -67,7 +67,7 @@ impl Default for AoVersusPathSettings {
     fn default() -> Self {
         Self {
             size: [640, 360],
-            // less than a minute for Sponza on two cores, and as good a radius as twice as many give (docs/ao-versus-path.md)
+            // as good a radius as twice as many samples give (docs/ao-versus-path.md)
             spp: 16,
             ao_samples: 32,
             seed: 0,
@@ -91,7 +91,6 @@ impl AoVersusPathSettings {
         self.ao_samples.div_ceil(2).max(1)
     }
 
-    /// What all renders have in common.
     fn shared(&self) -> RenderSettings {
         let (scene, camera, lighting) = (self.scene.clone(), self.camera.clone(), self.lighting.clone());
         RenderSettings { scene, camera, lighting, ..Default::default() }
@@ -107,7 +106,7 @@ impl AoVersusPathSettings {
         Ok((Self { camera, lighting: lit.lighting, ..self.clone() }, completed))
     }
 
-    /// The commands that render the best `lit` image and the path-traced one that it is compared with.
+    /// The commands that render the best `lit` image and its path-traced reference.
     fn commands(&self, scene: &str, fits: &[FitRecord]) -> Result<Vec<String>> {
         let Some(fit) = fits.first() else { return Ok(Vec::new()) };
         let mut shared = self.shared();
@@ -135,7 +134,6 @@ fn rounded(x: f64) -> f64 {
     crate::renderer::survey::significant(x, 4)
 }
 
-/// Part of the progress of a run.
 struct Steps<'a> {
     control: &'a mut dyn Control,
     /// Share of the work that was done before, and that of this part.
@@ -162,28 +160,31 @@ impl Control for Steps<'_> {
     }
 }
 
-/// The result of a comparison.
 pub struct AoVersusPath {
-    /// All figures.
     pub report: Report,
-    /// The best `lit` image (R, G, B, and A: 1 where a surface is visible), the path-traced one and direct light (`path`, `direct`), the ambient visibility of the best fit (`ao.Y`) and `ao-sky` (`sky.Y`).
+    /// The best `lit` image (R, G, B, and A: 1 where a surface is visible), the path-traced one and
+    /// direct light (`path`, `direct`), the best ambient visibility (`ao.Y`) and `ao-sky`
+    /// (`sky.Y`).
     pub image: Image,
-    /// 1 for each pixel that shows nothing but surfaces that reflect ambient light, 0 for the others: what metrics of the image count.
+    /// 1 for each pixel that metrics count: nothing but surfaces that reflect ambient light.
     pub counted: Vec<f32>,
 }
 
-/// Samples per pixel of the images that commands of the report make: their noise is then less than most errors.
+/// Samples per pixel of images by the report's commands, whose noise is less than most errors.
 const COMMAND_SPP: u32 = 1024;
 
-/// Compares ambient light with path tracing. Camera and light that settings leave open are chosen as [`Renderer::complete`] does for `path`, and the report names them.
+/// Compares ambient light with path tracing. Camera and light that settings leave open are chosen
+/// as [`Renderer::complete`] does for `path`.
 ///
 /// # Errors
-/// Those of [`Renderer::still`]; [`Error::Scene`] if no pixel shows a surface, or if there is no light that ambient light could stand for.
+/// Errors of [`Renderer::still`]; [`Error::Scene`] without surfaces in view or ambient light.
 pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &mut dyn Control) -> Result<AoVersusPath> {
     let start = Instant::now();
     let (settings, completed) = &settings.completed(renderer)?;
     let references = References::render(renderer, settings, control)?;
     let render_seconds = start.elapsed().as_secs_f64();
+
+    // Limits the search to pixels of surfaces and distances within the scene.
     let fit_start = Instant::now();
     let scene = renderer.scene();
     let diagonal = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).length());
@@ -195,6 +196,8 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
             renderer.name()
         )));
     }
+
+    // Fits ambient light to all light but the direct, with and without a traced environment.
     let path = add(&references.direct, &references.indirect);
     let mut fits = Vec::new();
     let mut best = None;
@@ -219,12 +222,16 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
             renderer.name()
         )));
     };
+
+    // Fits ambient visibility alone to the sky's.
     let diffuse = references.samples.diffuse();
     let sky = Target { channels: 1, halves: references.sky.clone(), pixels: diffuse.clone(), width };
     let sky_fit = (!sky.pixels.is_empty() && sky.energy() > 0.0).then(|| {
         let found = search(&references.samples, &sky, diagonal);
         report::sky_record(&references.samples, &sky, &found)
     });
+
+    // Puts together images and figures.
     let direct = references.lights.as_ref().filter(|_| light == EnvironmentLight::Ambient).unwrap_or(&references.direct);
     let image = picture(settings.size, &references, &path, direct, choice.attenuation, choice.ambient);
     let shares = LightShares::new(&references, &diffuse);
@@ -250,7 +257,7 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
     Ok(AoVersusPath { report, image, counted })
 }
 
-/// What is known of a fit against path tracing.
+/// The results of a fit against path tracing.
 struct PathFit<'a> {
     references: &'a References,
     /// The light that is not ambient.
@@ -272,12 +279,10 @@ fn subtract(a: &Halves, b: &Halves) -> Halves {
     combine(a, b, |a, b| a - b)
 }
 
-/// Mean of both halves.
 fn mean(halves: &Halves) -> Vec<f32> {
     halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a + b)).collect()
 }
 
-/// Direct light plus ambient light.
 fn lit(direct: &Halves, ambient: &Halves, color: [f64; 3]) -> Vec<f32> {
     let color = color.map(|c| c as f32);
     mean(direct).iter().zip(mean(ambient)).enumerate().map(|(k, (d, a))| d + color[k % 3] * a).collect()

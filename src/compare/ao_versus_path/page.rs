@@ -13,10 +13,8 @@ use crate::output::{Channel, Image, Samples};
 use crate::report::comparison::{self, NamedImage};
 use crate::report::{Axis, Cell, Chart, Mark, Page, Part, Point, Row, Section, Series, Table};
 
-/// A page with the best image beside direct light and path tracing, and what each approximation leaves. `command`: the command line that asked for it.
-///
-/// # Errors
-/// Those of [`ImageSet::new`].
+/// A page with the best image beside direct light and path tracing, and the rest that each
+/// approximation leaves. `command`: the command line that was typed.
 pub fn page(found: &AoVersusPath, command: &str, warnings: &[String]) -> Result<Page> {
     let report = &found.report;
     let mut sections = vec![images(found)?];
@@ -31,7 +29,7 @@ pub fn page(found: &AoVersusPath, command: &str, warnings: &[String]) -> Result<
     })
 }
 
-/// What a fit is against, in words.
+/// The target of a fit, in words.
 pub fn title(fit: &FitRecord) -> &'static str {
     match fit.environment_light {
         Some(EnvironmentLight::Ambient) => "Against path tracing, ambient light in place of the environment and of bounces",
@@ -93,7 +91,6 @@ fn summary(report: &Report) -> String {
     )
 }
 
-/// A choice in words.
 fn choice(choice: &ChoiceRecord) -> String {
     let radius = choice.radius.map(|r| format!("an AO radius of {}", significant(r)));
     let half = choice.half_distance.map(|h| format!("occlusion that halves every {}", significant(h)));

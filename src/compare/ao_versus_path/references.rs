@@ -17,21 +17,19 @@ const COST: [f64; 5] = [6.0, 1.5, 1.5, 1.0, 3.0];
 /// An image in two independent halves, channels interleaved.
 pub type Halves = [Vec<f32>; 2];
 
-/// All references of a view.
 pub struct References {
     /// Light of paths of two or more bounces: what direct light lacks.
     pub indirect: Halves,
     /// Emitted light and direct light, that of the environment included.
     pub direct: Halves,
-    /// Emitted light, and direct light of all lights but the environment; `None` if there is no environment.
+    /// Light of emitters and all lights but the environment; `None` without an environment.
     pub lights: Option<Halves>,
     /// Image of the integrator `ao-sky`, one channel.
     pub sky: Halves,
-    /// Occlusion rays.
     pub samples: Samples,
 }
 
-/// What is rendered.
+/// The subject of a render.
 #[derive(Clone, Copy, PartialEq)]
 enum Reference {
     Indirect,
@@ -42,10 +40,6 @@ enum Reference {
 }
 
 impl References {
-    /// Renders them.
-    ///
-    /// # Errors
-    /// Those of [`Renderer::still`].
     pub fn render(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &mut dyn Control) -> Result<Self> {
         let [width, height] = settings.size;
         let samples = Samples::new(width as usize * height as usize, settings.ao_samples_per_half())?;
@@ -61,12 +55,12 @@ impl References {
         renders.extend([Reference::Samples, Reference::Sky]);
         let cost = |r: &Reference| COST[*r as usize];
         let total = 2.0 * renders.iter().map(cost).sum::<f64>();
-        let mut begun = 0.0;
+        let mut started = 0.0;
         for render in &renders {
             for half in 0..2 {
-                let mut steps = Steps { control: &mut *control, first: begun / total, share: cost(render) / total };
+                let mut steps = Steps { control: &mut *control, first: started / total, share: cost(render) / total };
                 references.add(renderer, settings, *render, half, &mut steps)?;
-                begun += cost(render);
+                started += cost(render);
             }
         }
         Ok(references)

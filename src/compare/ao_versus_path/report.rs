@@ -25,25 +25,24 @@ pub struct ChoiceRecord {
     pub ambient: Vec<f64>,
     /// Root mean squared error against the target, of converged images.
     pub rmse: f64,
-    /// Relative standard error of the radius, or without a radius of the distance at which occlusion halves, by leaving out parts of the image; `None`: at the end of the
-    /// range that was searched, or a choice of both.
+    /// Relative standard error of the radius, or without one of the distance at which occlusion
+    /// halves, by leaving out parts of the image; `None` at the end of the range, or for a choice
+    /// of both.
     pub standard_error: Option<f64>,
 }
 
 /// An approximation, and what it leaves.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What the approximation is.
     pub name: &'static str,
     /// Ambient radiance that fits best; empty for none.
     pub ambient: Vec<f64>,
     /// Root mean squared error against the target, of converged images.
     pub rmse: f64,
-    /// Share of the target's mean square that the approximation accounts for: 1 - MSE / mean square. At most 1; below 0 it is worse than nothing.
+    /// Share of the target's mean square accounted for: 1 - MSE / mean square, below 0 if harmful.
     pub explained: f64,
 }
 
-/// Error over radius.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurveRecord {
     /// AO falloff; 1 is binary.
@@ -59,7 +58,7 @@ pub struct CurveRecord {
 /// Where the mean squared error of the best fit comes from; the three add up to it.
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorParts {
-    /// What is left with `ao-sky` in place of ambient occlusion: light that no ambient radiance describes, however well its visibility is known.
+    /// The error with `ao-sky` in place of ambient occlusion, which no ambient radiance can lower.
     pub transport: f64,
     /// Difference of ambient occlusion from `ao-sky`, each with its best ambient radiance.
     pub occlusion: f64,
@@ -67,8 +66,8 @@ pub struct ErrorParts {
     pub cross: f64,
 }
 
-/// Metrics of the best `lit` image against the path-traced one, over the pixels that show nothing but surfaces that reflect ambient light (visible lamps would outweigh all else); noise of
-/// both counts.
+/// Metrics of the best `lit` image against the path-traced one, over pixels of nothing but surfaces
+/// that reflect ambient light (visible lamps would outweigh them); noise of both counts.
 #[derive(Clone, Debug, Serialize)]
 pub struct Metrics {
     /// Mean FLIP of linear radiance clamped to 1.
@@ -84,7 +83,7 @@ pub struct Metrics {
 /// A fit against a target.
 #[derive(Clone, Debug, Serialize)]
 pub struct FitRecord {
-    /// What ambient light stands for: the setting `environment_light` of the integrator `lit`; `None` against `ao-sky`.
+    /// The setting of `lit` that says what ambient light stands for; `None` against `ao-sky`.
     pub environment_light: Option<EnvironmentLight>,
     /// Pixels that count.
     pub pixels: usize,
@@ -94,7 +93,6 @@ pub struct FitRecord {
     pub target_standard_error: f64,
     /// Approximations, from none to the best.
     pub rows: Vec<Row>,
-    /// The best choice.
     pub best: ChoiceRecord,
     /// The best radius of binary occlusion.
     pub binary: ChoiceRecord,
@@ -106,13 +104,11 @@ pub struct FitRecord {
     pub good_radii: [Option<f64>; 2],
     /// Where the error of the best choice comes from, mean squares; only against path tracing.
     pub parts: Option<ErrorParts>,
-    /// Metrics of the best choice.
     pub metrics: Metrics,
-    /// Error over radius.
     pub curves: Vec<CurveRecord>,
 }
 
-/// Mean radiance over the pixels that show nothing but surfaces that reflect ambient light, and which light it is.
+/// Mean radiance by its origin, over pixels of nothing but surfaces that reflect ambient light.
 #[derive(Clone, Debug, Serialize)]
 pub struct LightShares {
     /// Mean radiance of the path-traced image, over linear RGB.
@@ -125,22 +121,18 @@ pub struct LightShares {
     pub bounces: f64,
 }
 
-/// The figures of a comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The scene.
     pub scene: String,
-    /// Image size in pixels.
     pub size: [u32; 2],
     /// Paths per pixel of each reference.
     pub spp: u32,
     /// Occlusion rays per pixel.
     pub ao_samples: u32,
-    /// Seed of the sampler.
     pub seed: u32,
-    /// What settings left open and the scene decided, a sentence each.
+    /// A sentence for each setting that was left open and the scene decided.
     pub choices: Vec<String>,
-    /// The same as options of `skylit render`; `None` if nothing was left open.
+    /// The `choices` as options of `skylit render`; `None` if nothing was left open.
     pub chosen: Option<String>,
     /// Commands that render the best `lit` image of the first fit, and the path-traced one.
     pub commands: Vec<String>,
@@ -148,15 +140,12 @@ pub struct Report {
     pub diagonal: f64,
     /// Share of pixels that show surfaces.
     pub covered: f64,
-    /// Light of the path-traced image.
     pub light: LightShares,
     /// Fits against path tracing: first what the environment does, if there is one.
     pub path: Vec<FitRecord>,
-    /// Ambient visibility against `ao-sky`; `None` if no pixel shows nothing but surfaces that reflect ambient light.
+    /// Ambient visibility against `ao-sky`; `None` without pixels of nothing but such surfaces.
     pub sky: Option<FitRecord>,
-    /// Seconds of rendering.
     pub render_seconds: f64,
-    /// Seconds of the search.
     pub fit_seconds: f64,
 }
 
@@ -240,7 +229,8 @@ fn curve_record(curve: &Curve) -> CurveRecord {
     }
 }
 
-/// Ends of the interval about the best radius in which the error is within 5 % of the smallest, as far as the grid tells them; `None`: as far as was searched.
+/// Ends of the interval about the best radius in which the error is within 5 % of the smallest;
+/// `None`: as far as was searched.
 fn good_radii(curve: &Curve, best: f64) -> [Option<f64>; 2] {
     let least = (0..curve.rmse.len()).min_by(|&a, &b| curve.rmse[a].total_cmp(&curve.rmse[b])).unwrap_or(0);
     let good = |k: &usize| curve.rmse[*k] <= 1.05 * curve.rmse[least];

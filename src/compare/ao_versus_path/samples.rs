@@ -1,4 +1,4 @@
-//! Occlusion rays of an image, traced once: by the distances of their hits ambient light is known for every radius and falloff.
+//! Occlusion rays of an image, traced once for all radii and falloffs.
 
 use rayon::prelude::*;
 
@@ -45,7 +45,6 @@ impl Samples {
         *count += n as u32;
     }
 
-    /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.counts[0].len()
     }
@@ -56,13 +55,13 @@ impl Samples {
     }
 
     /// Samples of a pixel in a half.
-    pub fn of(&self, half: usize, pixel: usize) -> &[AmbientSample] {
+    pub fn pixel_samples(&self, half: usize, pixel: usize) -> &[AmbientSample] {
         &self.halves[half][pixel * self.per_half..(pixel + 1) * self.per_half]
     }
 
     /// All samples of a pixel.
     fn all_of(&self, pixel: usize) -> impl Iterator<Item = &AmbientSample> {
-        self.of(0, pixel).iter().chain(self.of(1, pixel))
+        self.pixel_samples(0, pixel).iter().chain(self.pixel_samples(1, pixel))
     }
 
     /// Pixels that show a surface, wherever in their area.
@@ -79,7 +78,7 @@ impl Samples {
     fn image(&self, channels: usize, of: impl Fn(&[AmbientSample], &mut [f32]) + Sync) -> [Vec<f32>; 2] {
         [0, 1].map(|half| {
             let mut out = vec![0.0; channels * self.pixels()];
-            out.par_chunks_exact_mut(channels).enumerate().for_each(|(pixel, out)| of(self.of(half, pixel), out));
+            out.par_chunks_exact_mut(channels).enumerate().for_each(|(pixel, out)| of(self.pixel_samples(half, pixel), out));
             out
         })
     }
@@ -104,7 +103,7 @@ impl Samples {
         })
     }
 
-    /// Ambient visibility. Samples whose surface reflects no ambient light have no occlusion ray, and count 0.
+    /// Ambient visibility. Samples of surfaces that reflect no ambient light count 0.
     pub fn visibility(&self, attenuation: Attenuation) -> [Vec<f32>; 2] {
         let falloff = Falloff::new(attenuation);
         self.image(1, |samples, out| {
@@ -134,10 +133,12 @@ impl Falloff {
 
     /// Occlusion of a hit at a distance; infinite distances are misses.
     pub fn occlusion(self, distance: f32) -> f32 {
-        match distance < self.reach {
-            false => 0.0,
-            true if self.log2 == 0.0 => 1.0,
-            true => (-distance * self.log2).exp2(),
+        if distance >= self.reach || distance.is_nan() {
+            0.0
+        } else if self.log2 == 0.0 {
+            1.0
+        } else {
+            (-distance * self.log2).exp2()
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The radius and falloff whose ambient light is closest to a target: a coarse grid over all that a scene's size allows, then a fine one about the best.
+//! The radius and falloff whose ambient light is closest to a target: a coarse grid over all that a
+//! scene's size allows, then a fine one about the best.
 
 use super::samples::Samples;
 use super::sums::{GROUPS, Sums, Table, Target};
@@ -6,9 +7,9 @@ use crate::integrators::ao::Attenuation;
 
 /// Radii of the coarse grid: per octave, and octaves below the scene's diagonal.
 const COARSE: (f64, f64) = (4.0, 12.0);
-/// Falloffs of the coarse grid: octaves of the distance at which occlusion halves, below the scene's diagonal.
+/// Falloffs of the coarse grid: octaves of the half-occlusion distance, below the scene's diagonal.
 const HALF_DISTANCES: f64 = 8.0;
-/// Greatest base 2 logarithm of a falloff: of a larger one the falloff itself, which is what people give, would not be finite.
+/// Greatest base 2 logarithm of a falloff, so that the falloff itself is finite.
 const MAX_LOG2: f64 = 900.0;
 /// Radii per octave of the fine grid for binary occlusion, one octave wide.
 const FINE: f64 = 16.0;
@@ -16,22 +17,21 @@ const FINE: f64 = 16.0;
 const FINE_FALLOFFS: f64 = 8.0;
 /// Radii per octave of the fine grid of both, two octaves wide.
 const FINE_BOTH: f64 = 8.0;
-/// Pixels by which falloffs are searched, at most: each costs as much as the radii of binary occlusion together.
+/// Maximum number of pixels for falloffs, each of which costs as much as all binary radii together.
 const PIXELS: usize = 1 << 15;
-/// A choice of two parameters must lower the mean squared error by this share to be preferred to one of a single parameter.
+/// Share by which a choice of two parameters must lower the mean squared error to be preferred.
 const GAIN: f64 = 0.01;
 
 /// A radius and falloff with the best ambient radiance for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Radius and falloff.
     pub attenuation: Attenuation,
     /// Ambient radiance, linear RGB; grey targets have it in the first channel.
     pub ambient: [f64; 3],
     /// Mean squared error against the target.
     pub mse: f64,
-    /// Standard error of the natural logarithm of what was searched for, the radius or (where it is infinite) the distance at which occlusion halves; by leaving out parts of the image
-    /// (jackknife). `None` if the best is at the end of the grid.
+    /// Standard error of the natural logarithm of the radius, or (where it is infinite) of the
+    /// distance at which occlusion halves, by a jackknife. `None` if the best is at the grid's end.
     pub log_error: Option<f64>,
 }
 
@@ -46,7 +46,6 @@ pub struct Curve {
     pub rmse: Vec<f64>,
 }
 
-/// The result of a search.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The best radius for binary occlusion.
@@ -190,7 +189,7 @@ fn greatest(values: &[f64]) -> usize {
     (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0)
 }
 
-/// Position of the maximum: the greatest value, refined by the parabola through it and its neighbours.
+/// Position of the maximum, refined by the parabola through it and its neighbours.
 fn peak(values: &[f64]) -> f64 {
     let k = greatest(values);
     if k == 0 || k + 1 >= values.len() {
@@ -201,8 +200,8 @@ fn peak(values: &[f64]) -> f64 {
     if curvature < 0.0 { k as f64 + (0.5 * (a - c) / curvature).clamp(-0.5, 0.5) } else { k as f64 }
 }
 
-/// A position among numbers that are `per_octave` to each factor of two, and the standard error of the natural logarithm of what it stands for. `at`: the
-/// position with a group left out.
+/// A position on a grid with `per_octave` points, and the standard error of its natural logarithm.
+/// `at`: the position with a group left out.
 fn jackknife(at: impl Fn(Option<usize>) -> f64, per_octave: f64) -> (f64, f64) {
     let position = at(None);
     let others: Vec<f64> = (0..GROUPS).map(|g| at(Some(g))).collect();
@@ -228,7 +227,7 @@ mod tests {
         );
     }
 
-    /// Pixels whose occluders are at random distances up to that of the pixel: the light that has a radius is found again, and so is a falloff.
+    /// Pixels whose occluders are at random distances up to that of the pixel.
     fn occluded(reach: impl Fn(u32) -> f32) -> Samples {
         let mut samples = Samples::new(64 * 64, 32).unwrap();
         let mut state = 3u32;

@@ -1,9 +1,11 @@
-//! Sums over pixels from which the best ambient colour and its error follow, for many radii and falloffs in one pass.
+//! Sums over pixels that give ambient colours and errors for many radii and falloffs in one pass.
 //!
-//! The ambient radiance A of a channel minimizes the mean of (A x - g)^2, x the light that surfaces reflect of an ambient radiance of 1 and g the light that is to be
-//! approximated: A = sum(x g) / sum(x x). Both are known with noise, in two independent halves a and b. Products of different halves have
-//! the expected value that products of the converged images have, so errors are those of converged images: noise adds nothing to them. A signal that is hardly there (a radius
-//! that nothing is nearer than) has a sum of squares that is nothing but noise, of either sign, and would explain anything: such sums explain nothing ([`CERTAIN`]).
+//! The ambient radiance A of a channel minimizes the mean of (A x - g)^2, x the light that surfaces
+//! reflect of an ambient radiance of 1 and g the target: A = sum(x g) / sum(x x). Both have noise,
+//! in two independent halves a and b. Products of different halves have the expected value of
+//! converged images, so noise adds nothing to errors. A signal that is hardly there (a radius that
+//! nothing is nearer than) has a sum of squares of mere noise, of either sign, and would explain
+//! anything: such sums explain nothing ([`CERTAIN`]).
 
 use std::ops::{AddAssign, Sub};
 
@@ -21,7 +23,7 @@ const CHANNELS: usize = 3;
 /// Standard errors by which the sum of squares of a signal must exceed 0 to be one.
 const CERTAIN: f64 = 4.0;
 
-/// What ambient light should look like: an image in two halves, and the pixels that count.
+/// The target of ambient light: an image in two halves, and the pixels that count.
 pub struct Target {
     /// 1 (ambient visibility) or 3 (linear RGB radiance).
     pub channels: usize,
@@ -49,17 +51,17 @@ impl Sums {
     fn add(&mut self, channel: usize, [xa, xb]: [f32; 2], [ga, gb]: [f32; 2]) {
         self.xg[channel] += 0.5 * (f64::from(xa) * f64::from(gb) + f64::from(xb) * f64::from(ga));
         self.xx[channel] += f64::from(xa) * f64::from(xb);
-        // mean times difference of the halves: its square has the variance of their product as its expected value
+        // expected square of mean times difference of the halves: the variance of their product
         self.xx_variance[channel] += (0.5 * (f64::from(xa) * f64::from(xa) - f64::from(xb) * f64::from(xb))).powi(2);
     }
 
-    /// The ambient radiance with the smallest error, not negative; 0 where the signal is no more than noise.
+    /// The ambient radiance of least error, not negative; 0 where the signal is no more than noise.
     pub fn ambient(&self) -> [f64; CHANNELS] {
         let is_certain = |c: usize| self.xx[c] > CERTAIN * self.xx_variance[c].sqrt();
         [0, 1, 2].map(|c| if is_certain(c) { (self.xg[c] / self.xx[c]).max(0.0) } else { 0.0 })
     }
 
-    /// What the best ambient radiance takes from the sum of squares of the target.
+    /// The decrease of the target's sum of squares by the best ambient radiance.
     pub fn explained(&self) -> f64 {
         let ambient = self.ambient();
         (0..CHANNELS).map(|c| ambient[c] * self.xg[c]).sum()
@@ -90,7 +92,7 @@ impl Sub for Sums {
 }
 
 impl Target {
-    /// The same with at most about `most` pixels, spread over the image.
+    /// A target of at most about `most` pixels, spread over the image.
     pub fn thinned(&self, most: usize) -> Self {
         // an odd step does not follow the columns of an image
         let step = self.pixels.len().div_ceil(most.max(1)) | 1;
@@ -203,7 +205,7 @@ impl Table {
 struct PixelSums {
     falloffs: Vec<Falloff>,
     radii: Vec<f32>,
-    /// Of each sample of each half: the first radius that is larger than the distance of its hit.
+    /// For each sample of each half, the first radius larger than the distance of its hit.
     first: [Vec<usize>; 2],
     /// Light that occluders between two radii take away, by half.
     taken: [Vec<[f32; CHANNELS]>; 2],
@@ -223,20 +225,22 @@ impl PixelSums {
     }
 
     fn add(&mut self, table: &mut Table, samples: &Samples, target: &Target, pixel: usize) {
-        let halves = [0, 1].map(|h| samples.of(h, pixel));
+        let halves = [0, 1].map(|h| samples.pixel_samples(h, pixel));
         let scale = 1.0 / samples.per_half() as f32;
         let group = target.group(pixel);
         let weights = |s: &crate::integrators::path::ambient::AmbientSample| match target.channels {
             1 => [scale, 0.0, 0.0],
             _ => s.reflectance.map(|c| c * scale),
         };
-        // light of samples that no radius reaches: from it, radii are added up from the largest down, so that what is left where hits occlude all is 0 and no rounding
+
+        // Finds the first radius that each sample's hit is within, and light beyond all.
         let mut unhit = [[0.0f32; CHANNELS]; 2];
         for (h, samples) in halves.iter().enumerate() {
             for (k, s) in samples.iter().enumerate() {
-                self.first[h][k] = match reflects(s) && s.distance.is_finite() {
-                    true => self.radii.partition_point(|r| *r <= s.distance),
-                    false => self.radii.len(),
+                self.first[h][k] = if reflects(s) && s.distance.is_finite() {
+                    self.radii.partition_point(|r| *r <= s.distance)
+                } else {
+                    self.radii.len()
                 };
                 if self.first[h][k] == self.radii.len() {
                     let w = weights(s);
@@ -244,6 +248,8 @@ impl PixelSums {
                 }
             }
         }
+
+        // Adds up light from the largest radius down, so that it is 0 where hits occlude all.
         for (f, falloff) in self.falloffs.iter().enumerate() {
             let mut left = unhit;
             for (h, samples) in halves.iter().enumerate() {
@@ -327,7 +333,9 @@ mod tests {
     fn what_is_occluded_is_black() {
         let samples = scattered(300, 7);
         let image = [0, 1].map(|half| {
-            let hits = |p: usize| samples.of(half, p).iter().filter(|s| s.distance.is_finite()).copied().collect::<Vec<_>>();
+            let hits = |p: usize| {
+                samples.pixel_samples(half, p).iter().filter(|s| s.distance.is_finite()).copied().collect::<Vec<_>>()
+            };
             (0..300).map(hits).collect::<Vec<_>>()
         });
         let most = image.iter().flatten().map(Vec::len).max().unwrap();
@@ -342,7 +350,7 @@ mod tests {
         (1..4).for_each(|r| assert_eq!(table.sums(0, r, None), Sums::default(), "{r}"));
     }
 
-    /// Two halves that hardly ever meet: by their one common pixel they would explain more than there is.
+    /// Two halves that hardly ever meet: by their one common pixel they would explain too much.
     #[test]
     fn a_signal_that_is_noise_explains_nothing() {
         let n = 10_000;

@@ -594,7 +594,7 @@ impl ViewerSession<'_> {
     fn save(&self, pane: usize, path: &Path) -> Result<()> {
         let none = || Error::Usage("there is no image to save yet".into());
         let view = self.panes.get(pane).and_then(Pane::shown).ok_or_else(none)?;
-        match ImageFormat::of(path)? {
+        match ImageFormat::from_path(path)? {
             ImageFormat::Exr => output::save(&view.image(&self.interactive, &mut NoControl)?, path),
             _ => view.picture()?.ok_or_else(none)?.save(path),
         }
