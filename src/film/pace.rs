@@ -1,5 +1,5 @@
-//! Adapts the size of launches: no dispatch should run longer than about a tenth of a second, because drivers reset devices
-//! that do not respond and users want to cancel.
+//! Adapts the size of launches: none should run longer than about a tenth of a second, because
+//! drivers reset devices that do not respond and users want to cancel.
 
 use crate::gpu::Timing;
 
@@ -7,7 +7,8 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Maximum number of rays in a launch on every device. Passes address results relative to a launch's first ray, so the tracer must not split launches.
+/// Maximum number of rays in a launch on every device. Passes address results relative to a
+/// launch's first ray, so the tracer must not split launches.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Chooses the size of launches from the measured time of earlier ones.
@@ -35,7 +36,7 @@ impl Pace {
         self.rays
     }
 
-    /// Number of launches in one submission, so that the host regains control about ten times a second.
+    /// Number of launches in a submission: the host regains control about ten times a second.
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
         if self.rays < self.most { 2 } else { 4 }
@@ -47,7 +48,7 @@ impl Pace {
         // without timestamps, the wall time is divided evenly among the launches
         let seconds = if longest > 0.0 { longest } else { wall / launches.max(1) as f64 };
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
-        // the first launch may have compiled the shader: its time is an upper bound that says little
+        // the first launch may have compiled the shader: its time says little
         let growth = if self.seen { 2.0 } else { 4.0 };
         let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, self.most as f64);
         self.rays = (next as u32) & !63;

@@ -37,7 +37,7 @@ pub const DEFAULT_FOV_Y: f64 = 45.0;
 /// Integrators whose images can be denoised.
 const DENOISED: AppliesTo = AppliesTo::stills_of(Capability::Denoising);
 /// Integrators to whose images tone mapping and exposure apply.
-const TONE_MAPPED: AppliesTo = AppliesTo::of(Capability::ToneMapping);
+const TONE_MAPPED: AppliesTo = AppliesTo::all_of(Capability::ToneMapping);
 
 settings! {
     /// The image.

@@ -6,7 +6,7 @@ use crate::settings::parse::parse_falloff;
 use crate::settings::{AppliesTo, Capability, Length, settings};
 
 /// Integrators that these settings apply to.
-const AO: AppliesTo = AppliesTo::of(Capability::AmbientOcclusion);
+const AO: AppliesTo = AppliesTo::all_of(Capability::AmbientOcclusion);
 
 settings! {
     /// Ambient occlusion.

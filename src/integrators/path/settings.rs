@@ -19,19 +19,19 @@ use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
 use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
-const LIGHT: AppliesTo = AppliesTo::of(Capability::LightTransport);
+const LIGHT: AppliesTo = AppliesTo::all_of(Capability::LightTransport);
 /// Integrators whose path length is configurable.
-const LONG: AppliesTo = AppliesTo::of(Capability::PathLength);
+const LONG: AppliesTo = AppliesTo::all_of(Capability::PathLength);
 /// Integrators that use a pixel filter and a lens.
 const CAMERA: AppliesTo = AppliesTo::stills_of(Capability::CameraModel);
 /// Integrators that read textures.
-const TEXTURES: AppliesTo = AppliesTo::of(Capability::Textures);
+const TEXTURES: AppliesTo = AppliesTo::all_of(Capability::Textures);
 /// Integrators with a choice of sampling strategy.
-const SAMPLED: AppliesTo = AppliesTo::of(Capability::SamplingStrategy);
+const SAMPLED: AppliesTo = AppliesTo::all_of(Capability::SamplingStrategy);
 /// The integrator with a white sky.
-const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
+const SKY: AppliesTo = AppliesTo::all_of(Capability::WhiteSky);
 /// The integrator with ambient light.
-const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
+const AMBIENT: AppliesTo = AppliesTo::all_of(Capability::AmbientLight);
 
 /// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl)
 /// ends paths long before.
