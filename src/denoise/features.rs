@@ -36,7 +36,7 @@ pub struct Features {
     /// Linear base colour, averaged over the pixel, channels interleaved. Mirrors and glass have
     /// their specular or transmitted colour, white furnaces 1, the background 0.
     pub albedo: Vec<f32>,
-    /// Geometric interpolated normal in world space, averaged over the pixel, channels interleaved.
+    /// World-space normal without normal maps, averaged over the pixel, channels interleaved.
     pub normals: Vec<f32>,
     /// Fraction of the pixel that is covered by surfaces, in [0, 1].
     pub coverage: Vec<f32>,

@@ -1,5 +1,5 @@
-//! All shaders. A pass is a static here, its name in the list below, and a file in shaders/. build.rs
-//! includes this file and compiles what the lists name.
+//! All shaders. A pass is a static here, its name in the list below, and a file in shaders/.
+//! build.rs includes this file and compiles what the lists name.
 
 use super::source::Mode::{self, Any, Closest};
 use super::source::Rays::{Camera, CameraOrKnown, Generated, Queue};

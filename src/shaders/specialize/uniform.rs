@@ -1,19 +1,22 @@
 //! Reads what is the same for all invocations at the start of a compute shader.
 //!
-//! Parameters of a pass and fields of the scene's root are at addresses in push constants. Mesa's CPU driver reads such a value once for a vector of lanes where it knows that the first
-//! of them is active, which is before any branch that lanes may take differently; behind one (a thread beyond the last pixel has returned) it gathers the same word for each lane.
-//! So these reads move to the first block, each value once. It does so only where the address follows from push constants alone, so nothing else moves. GPUs have scalar registers for
-//! such values wherever they are read.
+//! Parameters of a pass and fields of the scene's root are at addresses in push constants. Mesa's
+//! CPU driver reads such a value once for a vector of lanes before any branch that lanes may take
+//! differently; behind one (a thread beyond the last pixel has returned) it gathers the same word
+//! for each lane. So these reads move to the first block, each value once, where the address
+//! follows from push constants alone. GPUs have scalar registers for such values wherever they are
+//! read.
 //!
-//! A read that moves is one that may not have happened otherwise. Addresses in push constants are valid or null, and nothing is read through one that the shader looks at. Only members
-//! that the shader declares `readonly` are read, at constant indices.
+//! A read that moves may not have happened otherwise. Addresses in push constants are valid or
+//! null, and nothing is read through one that the shader compares. Only members that the shader
+//! declares `readonly` are read, at constant indices.
 
 use std::collections::{HashMap, HashSet};
 
 use rspirv::dr::{Block, Function, Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, ExecutionModel, MemoryAccess, Op, StorageClass};
 
-/// Moves the reads of a compute shader's entry point. Functions that it calls keep theirs: the optimizer has inlined them.
+/// Moves the reads of a compute shader's entry point; the optimizer has inlined the others.
 pub(super) fn read_first(module: &mut Module) {
     let entry = module.entry_points.iter().find_map(|e| match e.operands[..] {
         [Operand::ExecutionModel(ExecutionModel::GLCompute), Operand::IdRef(id), ..] => Some(id),
@@ -38,7 +41,7 @@ pub(super) fn read_first(module: &mut Module) {
     }
 }
 
-/// What the module says about types, constants and variables.
+/// The module's types, constants and variables.
 struct Facts {
     /// Storage class and pointee, by the id of a pointer's type.
     pointers: HashMap<u32, (StorageClass, u32)>,
@@ -77,7 +80,7 @@ impl Facts {
         facts
     }
 
-    /// Whether a read-only structure is what a pointer of this type points at, if its member of this number is asked for.
+    /// Whether a pointer of this type points at a structure whose member is read-only.
     fn is_readonly(&self, pointer: u32, member: u32) -> bool {
         matches!(self.pointers.get(&pointer), Some((StorageClass::PhysicalStorageBuffer, pointee)) if self.readonly.contains(&(*pointee, member)))
     }
@@ -92,7 +95,7 @@ struct Moves {
     same: HashMap<u32, u32>,
     /// Results that follow from push constants alone, and what each is made of.
     from_push: HashMap<u32, Vec<u32>>,
-    /// Those that are pointers.
+    /// The results that are pointers.
     pointers: HashSet<u32>,
 }
 
@@ -126,7 +129,7 @@ impl Moves {
         moves
     }
 
-    /// Whether an instruction moves, and if so whether its result follows from push constants alone.
+    /// Whether an instruction moves, and if so whether its result depends on push constants alone.
     fn place(&self, i: &Instruction, facts: &Facts, types: &HashMap<u32, u32>, looked_at: &HashSet<u32>) -> Option<bool> {
         let is_from_push = |id: &u32| self.from_push.contains_key(id);
         let is_known = |o: &Operand| o.id_ref_any().is_none_or(|id| is_from_push(&id) || facts.numbers.contains_key(&id));
