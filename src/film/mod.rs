@@ -84,6 +84,14 @@ impl FilmPixel {
     }
 }
 
+/// Mean over covered pixels and `channels` interleaved channels; 0 if nothing is covered.
+pub fn covered_mean(values: &[f32], channels: usize, coverage: &[f32]) -> f64 {
+    let covered: f64 = coverage.iter().map(|&x| f64::from(x)).sum();
+    let values = values.iter().enumerate().filter(|(k, _)| coverage[k / channels] > 0.0);
+    let sum: f64 = values.map(|(_, &x)| f64::from(x)).sum();
+    if covered > 0.0 { sum / (covered * channels as f64) } else { 0.0 }
+}
+
 /// A finished film, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Film {

@@ -1,4 +1,5 @@
-//! Samples of ambient light: what of an image changes with the radius and falloff of ambient occlusion, and with the ambient colour.
+//! Samples of ambient light: how an image changes with the radius and falloff of ambient occlusion,
+//! and with the ambient colour.
 
 use super::complete::Completed;
 use super::still::scene_warnings;
@@ -10,8 +11,9 @@ use crate::integrators::path::ambient::{self, TakeSamples};
 use crate::scene::Motion;
 
 impl Renderer {
-    /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name, to their nearest hits, and hands the distances to `take`: by them the image is known
-    /// for every radius, falloff and ambient colour.
+    /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name,
+    /// to their nearest hits, and hands the distances to `take`: by them the image is known for
+    /// every radius, falloff and ambient colour.
     ///
     /// # Errors
     /// As [`Renderer::still`].

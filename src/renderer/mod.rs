@@ -1,7 +1,8 @@
-//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were compiled, behind two functions: [`Renderer::still`] and
-//! [`Renderer::frames`].
+//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were
+//! compiled, behind two functions: [`Renderer::still`] and [`Renderer::frames`].
 //!
-//! Later calls reuse what earlier ones have built: the tracer, if the settings need the same scene data, and all pipelines.
+//! Later calls reuse what earlier ones have built: the tracer, if the settings need the same scene
+//! data, and all pipelines.
 //!
 //! ```
 //! use skylit::film::NoControl;
@@ -106,7 +107,8 @@ struct Lighting {
 }
 
 impl Renderer {
-    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts: on small scenes they take equally long.
+    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts, which takes about as
+    /// long.
     ///
     /// # Errors
     /// Those of [`load::load`] and [`Device::open`].
@@ -164,7 +166,7 @@ impl Renderer {
         })
     }
 
-    /// The same renderer with this name of its scene, a file or `builtin:NAME`, in metadata and messages.
+    /// Names the scene, a file or `builtin:NAME`, in metadata and messages.
     pub fn with_name(mut self, name: &str) -> Self {
         name.clone_into(&mut self.name);
         self
@@ -197,7 +199,7 @@ impl Renderer {
         (self.kind, &self.kind_reason)
     }
 
-    /// Renders an image: a still, or the last of the real-time frames, whichever the settings describe.
+    /// Renders an image: a still, or the last of the real-time frames, as the settings describe.
     ///
     /// # Errors
     /// Those of [`Renderer::still`] and [`Renderer::frames`].
@@ -222,7 +224,8 @@ impl Renderer {
         frames.image(control)
     }
 
-    /// Returns true if images of these settings show an environment, or a light infinitely far away, where no surface is: then they have no background of their own.
+    /// Returns true if images of these settings show an environment, or a light infinitely far
+    /// away, where no surface is: then they have no background of their own.
     ///
     /// # Errors
     /// Those of lights and environments that cannot be read.
@@ -237,7 +240,7 @@ impl Renderer {
         self.device.save_pipeline_cache();
     }
 
-    /// Applies settings of what the scene's file leaves open. The traced scene is built anew if that changes it.
+    /// Applies settings that the scene's file leaves open; a change of them builds the tracer anew.
     pub(crate) fn apply_scene_settings(&mut self, settings: &SceneSettings) {
         if settings.apply(&mut self.scene) {
             // the traced scene changes

@@ -34,7 +34,7 @@ pub struct StillExtras {
     pub keep_rays: bool,
     /// Render auxiliary outputs even if settings name none, for a depth image.
     pub aov: bool,
-    /// Make intermediate images at every power of two of samples even if settings do not select them, for viewers.
+    /// Make intermediate images at powers of two of samples whatever the settings, for viewers.
     pub intermediate: bool,
 }
 
@@ -44,7 +44,7 @@ pub struct Still {
     pub image: Image,
     /// Auxiliary outputs, rows from the top, if requested.
     pub aov: Vec<AovPixel>,
-    /// Camera rays and occlusion rays of the first sample in world space, if [`StillExtras::keep_rays`] is set.
+    /// World-space camera and occlusion rays of the first sample, with [`StillExtras::keep_rays`].
     pub rays: [Vec<Ray>; 2],
     /// The report of the render.
     pub report: StillReport,
@@ -64,7 +64,7 @@ impl Still {
     /// As [`Still::save`], with settings of the file; those of other formats are ignored.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown format, or one that cannot have what the settings say; [`Error::Output`].
+    /// [`Error::Usage`] for an unknown format, or settings that it lacks; [`Error::Output`].
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
         save(&self.image, self.integrator, &self.picture, files, path)
     }
@@ -98,7 +98,7 @@ fn save(image: &Image, integrator: &dyn Integrator, options: &PictureOptions, fi
     let mut shown = match files.background {
         // the scene on black, as it is in the image
         None => integrator.picture(image, options),
-        // the scene alone: what a display shows of a colour is not in proportion to it, so that alpha comes afterwards
+        // the scene without its alpha, since displayed colours are not in proportion to linear ones
         Some(_) => integrator.picture(&picture::unassociated(image), options),
     };
     let alpha = image.channels.iter().find(|c| c.name == "A").filter(|_| shown.f32("A").is_none());
@@ -112,12 +112,14 @@ impl Renderer {
     /// Renders a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device; those of `control`.
+    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of
+    /// the device and of `control`.
     pub fn still(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Still> {
         self.still_with(settings, StillExtras::default(), control, &mut |_| Ok(()))
     }
 
-    /// As [`Renderer::still`]; `save` receives intermediate images, at the numbers of samples that [`super::settings::FilmSettings::intervals`] selects.
+    /// As [`Renderer::still`]; `save` receives intermediate images, at the numbers of samples that
+    /// [`super::settings::FilmSettings::intervals`] selects.
     ///
     /// # Errors
     /// As [`Renderer::still`], and those of `save`.
@@ -139,8 +141,7 @@ impl Renderer {
         self.still_of(&completed, extras, (start, laps), control, save)
     }
 
-    /// Renders a still of completed settings. `started`: when work on it began, and the parts of
-    /// its time so far.
+    /// Renders a still of completed settings. `started`: begin of the work, and its parts so far.
     pub(super) fn still_of(
         &mut self,
         completed: &Completed,
@@ -406,12 +407,12 @@ pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Opti
     out
 }
 
-/// Numbers of samples at which intermediate images are saved: powers of two, and those that the scene names.
+/// Numbers of samples of intermediate images: powers of two, and those that the scene names.
 pub fn intervals(settings: &RenderSettings, hints: &RenderHints, spp: u32) -> Vec<u32> {
-    let mut intervals: Vec<u32> = match settings.film.intervals {
-        true => powers_of_two(spp).chain(hints.save_intervals.iter().copied()).collect(),
-        false => Vec::new(),
-    };
+    if !settings.film.intervals {
+        return Vec::new();
+    }
+    let mut intervals: Vec<u32> = powers_of_two(spp).chain(hints.save_intervals.iter().copied()).collect();
     intervals.retain(|&n| n > 0 && n < spp);
     intervals.sort_unstable();
     intervals.dedup();
@@ -449,8 +450,7 @@ struct Composer<'a> {
 }
 
 impl Composer<'_> {
-    /// Composes the image of a film: its channels, denoised where that is wanted, auxiliary outputs
-    /// and metadata.
+    /// Composes the image of a film: channels, denoised if wanted, auxiliary outputs and metadata.
     fn compose(&self, accumulated: &Accumulated, control: &mut dyn Control) -> Result<Image> {
         let mut channels = self.channels(accumulated);
         let mut metadata = self.metadata(accumulated);
@@ -463,7 +463,7 @@ impl Composer<'_> {
         Ok(Image { width, height, channels, metadata })
     }
 
-    /// The film as named channels: means, coverage, the variance of one sample of each channel, and the film's sums if its state is kept.
+    /// The film as named channels: means, coverage, the variance of a sample, and sums if kept.
     fn channels(&self, image: &Accumulated) -> Vec<Channel> {
         let (film, names) = (&image.film, self.render.integrator.channels());
         let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
@@ -473,7 +473,7 @@ impl Composer<'_> {
             let name = if names.len() == 1 { "variance".into() } else { format!("variance.{name}") };
             out.push(f32s(name, film.variance_plane(c)));
         }
-        // exact: there are at most 2^24; floats, because frames in real time have fractions of samples
+        // exact, as there are at most 2^24; frames in real time have fractions of samples
         out.push(f32s("samples".into(), film.samples.iter().map(|n| *n as f32).collect()));
         out.extend(image.state.iter().flat_map(|s| film_file::state_channels(s, names)));
         out

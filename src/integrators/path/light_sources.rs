@@ -1,4 +1,4 @@
-//! What light comes from: the environment in device memory, and the lights of a scene on the host.
+//! Sources of light: the environment in device memory, and the lights of a scene on the host.
 
 use std::sync::Arc;
 
@@ -57,8 +57,7 @@ impl LightSources {
         (features, light_kinds)
     }
 
-    /// Returns true if paths must keep the density of light samples of the environment: no table
-    /// has it.
+    /// Returns true if paths must keep the environment's density, which no table has then.
     pub fn needs_sky_pdfs(&self, features: PathFeatures, light_kinds: LightKinds) -> bool {
         features.contains(PathFeature::LightSamples)
             && self.lights.environment.is_some()
