@@ -38,16 +38,14 @@ pub struct FrameSamples {
 }
 
 impl FrameSamples {
-    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames
-    /// at rest all sample the same pattern, and so have the same number. `is_cpu`: the device is a
-    /// processor, as opposed to a GPU.
+    /// Samples of radiance in images of so many pixels. `period` is left to the paths, whose frames
+    /// at rest all sample the same pattern, and so have the same number.
     pub fn of_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
         // a tenth of a frame's time is then for other things
         const FIRST_PER_PIXEL: u64 = 8;
         // a fortieth
         const MAX_PER_PIXEL: u64 = 32;
-        // the first long frames take about a second on two cores, and a tenth of that on a GPU that
-        // traces 160 times as many
+        // the first long frames take about a second on two cores, and a tenth of that on a GPU
         const FIRST_PATHS: u64 = 1 << 20;
         const FIRST_GPU_PATHS: u64 = 1 << 24;
         const GROWTH: u64 = 4;
@@ -58,17 +56,18 @@ impl FrameSamples {
         let grows = settings.converges() && settings.resolution.period() == 1;
         // several paths of a short frame after the first at rest lie anywhere in their pixels
         let forgets_short = many >= 4 && (few == 1 || grows);
-        let (ramp, first_long) = match forgets_short && grows {
-            true => ((many / few.next_power_of_two().max(2)).checked_ilog2().unwrap_or(0), 1),
-            false => (0, FIRST_LONG),
+        let (ramp, first_long) = if forgets_short && grows {
+            ((many / few.next_power_of_two().max(2)).checked_ilog2().unwrap_or(0), 1)
+        } else {
+            (0, FIRST_LONG)
         };
         let times = per_pixel(GROWTH * most_paths, MAX_PER_PIXEL) / many;
         let doublings = if grows { times.checked_ilog2().unwrap_or(0) } else { 0 };
         Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
     }
 
-    /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight
-    /// samples of a pixel on.
+    /// Samples of ambient visibility. Long frames take them as stills do, which is faster from
+    /// eight samples of a pixel on.
     pub fn of_visibility(settings: &Settings, pixels: u64) -> Self {
         // half a second on two cores, where that is enough for eight; in large images seconds
         const MAX_PER_PIXEL: u64 = 16;
@@ -126,8 +125,7 @@ impl FrameSamples {
         // all that have fewer have as many together as one
         let frames = frames - self.ramp;
         let doublings = self.doublings_before(frames);
-        // 2 PARTS frames have as many together as PARTS of the next number, and all that follow
-        // likewise
+        // 2 PARTS frames have as many together as PARTS of the next number, and so on
         (u64::from(self.many) * u64::from(frames - PARTS * doublings)) << doublings
     }
 
@@ -215,8 +213,7 @@ mod tests {
                         let now = samples.in_frame(resting);
                         if samples.is_long(resting) {
                             assert_eq!(samples.in_long_before(resting), in_long);
-                            // a block of the sequence, and a small part of all, or as few as at
-                            // first
+                            // a block of the sequence, and a small part of all, or as few as first
                             assert!(in_long.is_multiple_of(now), "{samples:?}");
                             let is_part = if now <= samples.many {
                                 in_long == 0 || now <= in_long.max(samples.few)

@@ -34,7 +34,7 @@ pub struct Frame<'a> {
     pub camera: CameraRecord,
     /// Objects that moved since the previous frame.
     pub moved: &'a [MovedRecord],
-    /// What the frame does.
+    /// The plan of the frame.
     pub plan: &'a FramePlan,
     /// From the space of the previous frame's camera to that of this one's, three rows.
     pub previous_to_camera: [[f32; 4]; 3],
@@ -59,8 +59,7 @@ impl Range {
         vec![Self { first: 0, count }]
     }
 
-    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a
-    /// group).
+    /// Splits rays into launches of whole groups of `group` rays, of at most `most` or a group.
     pub fn launches(rays: u32, group: u32, most: u32) -> Vec<Self> {
         let most = (most / group).max(1) * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
@@ -137,8 +136,7 @@ enum Frames {
     Long,
 }
 
-/// Passes that are recorded one after another for each of several ranges; mostly one pass and one
-/// range.
+/// Passes that are recorded one after another for each of several ranges.
 pub struct Stage {
     passes: Vec<Box<dyn Pass>>,
     ranges: Vec<Range>,
@@ -189,10 +187,9 @@ impl Graph {
     pub fn new(device: &Arc<Device>, extent: Extent, stages: Vec<Stage>) -> Result<Self> {
         let mut resources = Resources::new(extent);
         resources.allocate(device, &stages.iter().map(Stage::uses).collect::<Vec<_>>())?;
-        let ray_count = match resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none()) {
-            true => Some(Buffer::new(device, "number of rays for the host", 4, Memory::Readback)?),
-            false => None,
-        };
+        let needs_copy = resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none());
+        let ray_count = || Buffer::new(device, "number of rays for the host", 4, Memory::Readback);
+        let ray_count = needs_copy.then(ray_count).transpose()?;
         Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count, unfinished: Vec::new() })
     }
 
@@ -282,15 +279,13 @@ impl Graph {
         recorded
     }
 
-    /// Forgets which stages have run, after a frame that was not finished: the next frame records
-    /// all of them.
+    /// Has the next frame record all stages, because a frame was not finished.
     pub fn invalidate(&mut self) {
         self.stages.iter_mut().for_each(|s| s.versions.clear());
     }
 
-    /// After a frame that was not finished: double-buffered resources are those of the frame before
-    /// again. What passes add to in place ([`Resource::Rest`], [`Resource::RestParts`]) is in
-    /// pieces.
+    /// Takes an unfinished frame back: double-buffered resources are the frame before's again.
+    /// The contents of [`Resource::Rest`] and [`Resource::RestParts`] are lost.
     pub fn take_back(&mut self) {
         for resource in self.unfinished.drain(..) {
             self.resources.swap(resource);
@@ -411,8 +406,7 @@ struct Hazards {
 }
 
 impl Hazards {
-    /// Records a barrier if what follows reads a written buffer, or writes a read or written one;
-    /// then notes what follows.
+    /// Records a barrier if a use conflicts with those since the last one; then notes the use.
     fn before(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
         if self.conflicts(reads, writes) {
             r.barrier();

@@ -1,4 +1,4 @@
-//! What frames leave behind for those after them.
+//! State that frames leave behind for those after them.
 
 use glam::DMat3;
 
@@ -45,7 +45,7 @@ pub struct PathSequence {
     pub of_pattern: u32,
 }
 
-/// What the next frame depends on of those before it, on the host.
+/// Host state of earlier frames that the next one depends on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     /// Number of the next frame, by which samples are chosen.
@@ -70,7 +70,7 @@ pub struct History {
     pub environment_turn: Option<DMat3>,
     /// A frame was interrupted: the samples at rest are in pieces and start anew.
     pub was_interrupted: bool,
-    /// What the last frame displayed; `None`: there was none.
+    /// Display of the last frame; `None`: there was none.
     pub shown: Option<Option<Display>>,
 }
 

@@ -61,8 +61,7 @@ use signals::larsen::Larsen;
 use signals::radiance::Radiance;
 use signals::visibility::AmbientVisibility;
 
-/// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as
-/// another surface.
+/// Distance from a tangent plane, in pixel footprints, from which neighbours are other surfaces.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals below which a neighbour counts as another surface.
 const NORMAL_TOLERANCE: f32 = 0.9;
@@ -77,11 +76,9 @@ pub struct FrameStats {
     pub primary_rays: u64,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
-    /// Occlusion rays of sampled pixels that were not traced: background, or a full history while
-    /// nothing moves.
+    /// Occlusion rays of sampled pixels not traced: background, or a full history at rest.
     pub skipped_rays: u64,
-    /// BVH nodes that the frame's camera rays visit; `None` unless they are displayed
-    /// ([`DisplayMode::Nodes`]).
+    /// BVH nodes that camera rays visit, if they are displayed ([`DisplayMode::Nodes`]).
     pub nodes: Option<NodeVisits>,
 }
 
@@ -267,8 +264,7 @@ impl Realtime {
         signal.frame_samples(settings, signals::pixels(size), is_cpu).frames_for_first(frames).min(frames)
     }
 
-    /// Samples of a pixel that the last frame shows: since the image came to rest, or of the
-    /// longest history.
+    /// Samples of a pixel that the last frame shows: those at rest, or of the longest history.
     pub fn shown_samples(&self) -> u32 {
         let (s, resting) = (&self.settings, self.history.motion.frames_at_rest());
         if s.converges() {
@@ -291,8 +287,7 @@ impl Realtime {
         self.history.reset();
     }
 
-    /// Discards the history as [`Realtime::reset`] does, and restarts the sampler at the first
-    /// frame.
+    /// Discards the history, and restarts the sampler at the first frame.
     pub fn rewind(&mut self) {
         self.start_at(0);
     }
@@ -439,16 +434,14 @@ impl Realtime {
         let (pixels, samples) = (self.pixels(), plan.progress.samples);
         let all = pixels * u64::from(samples) / u64::from(self.signal.period(plan, &self.settings));
         let has_known_hits = self.graph.resources().buffer(Resource::KnownHits).is_some();
+        let shows_nodes = self.display.is_some_and(|d| d.shown == DisplayMode::Nodes);
         Ok(FrameStats {
             timings,
             samples,
             primary_rays: self.signal.camera_rays(plan, &self.settings, pixels, has_known_hits),
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
-            nodes: match self.display.is_some_and(|d| d.shown == DisplayMode::Nodes) {
-                true => Some(NodeVisits::read(self.graph.resources(), pixels)?),
-                false => None,
-            },
+            nodes: shows_nodes.then(|| NodeVisits::read(self.graph.resources(), pixels)).transpose()?,
         })
     }
 

@@ -12,7 +12,7 @@ use crate::interface::records::passes::ResampleParams;
 use crate::shaders::{self, LANES};
 use crate::tracer::{Push, Tracer};
 
-/// What the next frame reads of the previous one.
+/// Resources of the previous frame that the next one reads.
 const REMEMBERED: [Resource; 6] = [
     Resource::Guide,
     Resource::History,
@@ -27,8 +27,7 @@ const REMEMBERED: [Resource; 6] = [
 /// mostly, the others know little more.
 const SEEN_ENOUGH: f64 = 0.75;
 
-/// Largest side of images that are resampled, pixels: products of two are numbers of 32 bits in the
-/// shader.
+/// Largest side of images that are resampled, pixels: the shader multiplies two in 32 bits.
 const MAX_SIDE: u32 = 1 << 15;
 
 impl Realtime {

@@ -32,8 +32,7 @@ impl CameraMotion {
         }
     }
 
-    /// Returns true if the camera is cut to another view after frame `before`, and at `frame` or
-    /// earlier.
+    /// Returns true if the camera is cut after frame `before`, and at `frame` or earlier.
     pub fn has_cut(&self, before: f64, frame: f64) -> bool {
         matches!(self, Self::Path(path) if path.has_cut(before, frame))
     }
@@ -117,8 +116,7 @@ impl<'a> FrameSequence<'a> {
         Ok(Self { camera, file_camera, motion, played, frames_per_second, held: None, last: None, has_cut: false })
     }
 
-    /// The same with the animation held at a time, in seconds since its start, if one is given; the
-    /// camera's motion goes on.
+    /// Holds the animation at a time in seconds, if one is given; the camera's motion goes on.
     #[must_use]
     pub fn held_at(self, seconds: Option<f64>) -> Self {
         Self { held: seconds, ..self }
@@ -170,8 +168,7 @@ impl<'a> FrameSequence<'a> {
         self.has_cut
     }
 
-    /// The scene as it is in the last frame, if the animation moves lights or surfaces that emit
-    /// light.
+    /// The scene as it is in the last frame, if its animation moves lights or emissive surfaces.
     pub fn posed_lights(&self) -> Option<&Arc<Scene>> {
         self.played.as_ref()?.posed.as_ref()
     }

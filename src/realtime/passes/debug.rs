@@ -14,7 +14,7 @@ use crate::realtime::settings::Settings;
 use crate::shaders::ComputeShader;
 use crate::tracer::Tracer;
 
-/// What a debug view declares. Its shader takes `DebugParams`.
+/// A debug view. Its shader takes `DebugParams`.
 pub struct DebugView {
     /// Resources of this frame that it reads: what it shows stays until one of them changes.
     pub reads: &'static [Resource],

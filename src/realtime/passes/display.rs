@@ -164,7 +164,7 @@ fn thresholds() -> [f32; 256] {
 mod tests {
     use super::*;
 
-    /// What the shader does with a perfect guess, around each place where a byte changes.
+    /// The shader's result for a perfect guess, around each position where a byte changes.
     #[test]
     fn thresholds_are_those_of_the_encoding() {
         let table = thresholds();

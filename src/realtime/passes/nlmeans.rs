@@ -12,9 +12,9 @@ use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, ComputeShader};
 use crate::tracer::Tracer;
 
-/// Assumed convergence of samplers: the variance of the mean of n samples falls as
-/// `n^-(1 + EVENNESS)`. Of 64 samples of ambient occlusion it is between a half and 1.5 times that in
-/// six scenes (docs/denoising.md); weights need to know it no better.
+/// Assumed convergence of samplers: the variance of the mean of n samples falls as `n^-(1 +
+/// EVENNESS)`. For 64 samples of ambient occlusion that is between a half and 1.5 times too much in
+/// six scenes (docs/denoising.md); weights need no better.
 pub const EVENNESS: f32 = 0.33;
 
 /// The shader for images of so many channels, 1 or 3.

@@ -27,9 +27,8 @@ struct RadianceFilter {
     to: Resource,
 }
 
-/// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the
-/// rest is black and is left alone), and the images that hold the results: diffuse reflection and
-/// the rest.
+/// The steps of the filter over the tiles of the image, and the images that hold the results:
+/// diffuse reflection and the rest, which is black without `has_specular` and left alone.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::DENOISE.specialized(device, &settings.filter.specialization())?);

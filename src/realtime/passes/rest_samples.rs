@@ -19,8 +19,7 @@ use crate::tracer::Push;
 /// reference, have samples of their own.
 const SEED: u32 = 0x7265_7374;
 
-/// The pipelines and their memory, made when the first long frame comes: who never rests does
-/// without.
+/// The pipelines and their memory, made when the first long frame comes.
 struct Traced {
     rays: AoRays,
     has_entry_points: bool,

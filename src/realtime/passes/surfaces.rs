@@ -25,8 +25,7 @@ struct Surfaces {
     pixels: u32,
 }
 
-/// The pass over all pixels of an image. It lists those that are `uncovered`, where there are
-/// histories.
+/// The pass over all pixels of an image, which lists `uncovered` ones if there are histories.
 pub fn stage(
     tracer: &Tracer,
     scene: &Scene,

@@ -11,7 +11,7 @@ use super::plan::Signal;
 use super::resources::Extent;
 use super::settings::Settings;
 
-/// What the frames of a signal are made of, at one image size.
+/// The passes of the frames of a signal, at one image size.
 pub struct Pipeline {
     /// The signal.
     pub signal: &'static dyn Signal,

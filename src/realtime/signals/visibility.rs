@@ -131,10 +131,7 @@ impl Signal for AmbientVisibility {
             spreads: false,
             // long frames have rays of their own, anywhere in the pixels
             keeps_offset: is_still && is_long,
-            first_sample: match is_long {
-                true => inputs.frame_samples.in_long_before(motion.frames_at_rest()),
-                false => 0,
-            },
+            first_sample: if is_long { inputs.frame_samples.in_long_before(motion.frames_at_rest()) } else { 0 },
             paths: history.paths,
         }
     }
