@@ -1,5 +1,4 @@
-//! Feature images for denoising: AOVs of each pixel's centre, and of a grid of points in it, which
-//! show whether a pixel contains several surfaces.
+//! Feature images for denoising: AOVs of each pixel's centre, and of a grid of points in it.
 
 use glam::Vec3;
 
@@ -141,8 +140,7 @@ impl Features {
     }
 }
 
-/// Number of grid points beyond a pixel's border that may be visible in it: the filter's reach, and
-/// one more, because what lies between two points may belong to either.
+/// Number of grid points beyond a border that may be visible: the filter's reach, and one between.
 fn reach(filter: PixelFilter) -> usize {
     let beyond = match filter {
         PixelFilter::Box | PixelFilter::Centre => 0.0,

@@ -4,8 +4,7 @@
 //!
 //! Left alone are mirrors, glass and polished metal, because the features do not show the edges in
 //! reflections; emitters and the background; and pixels that contain one of the latter two. Pixels
-//! with several surfaces are averaged among themselves only, so that no light leaks onto adjacent
-//! surfaces.
+//! with several surfaces are averaged among themselves only, so that no light leaks.
 
 use crate::shaders::{self, LANES};
 use std::time::Instant;

@@ -16,9 +16,8 @@ use crate::tracer::Push;
 /// Samples of a pixel from which non-local means count at least as much as the guided filter.
 const EVEN_SAMPLES: f32 = 16.0;
 
-/// Mixes the film's means, filtered by non-local means, into `filtered`, the result of the filter
-/// that is guided by surfaces: the more the more samples a pixel has. `depths` says which pixels
-/// are averaged (`NlMeansParams`).
+/// Mixes the film's means, filtered by non-local means, into those that surfaces guided: the more
+/// the more samples a pixel has. `depths` says which pixels are averaged (`NlMeansParams`).
 ///
 /// # Errors
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
@@ -41,8 +40,7 @@ pub fn refine(
     Ok(())
 }
 
-/// Each pixel's value and its variance, which is summed over channels and averaged over 3x3 pixels,
-/// because few samples know their own badly.
+/// Each pixel's value and its variance, averaged over 3x3 pixels: few samples know it badly.
 fn estimates(film: &Film) -> Vec<f32> {
     let [width, height] = [film.width as usize, film.height as usize];
     let errors: Vec<f32> = (film.samples.iter().zip(film.variance.chunks_exact(film.channels)))

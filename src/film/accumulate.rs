@@ -1,6 +1,5 @@
-//! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), and within a
-//! step block by block, batch by batch and launch by launch. Reports progress, respects a time
-//! limit, and can be stopped so that every pixel has complete samples.
+//! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), block by
+//! block, batch by batch and launch by launch. A stop leaves every pixel with complete samples.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,8 +19,7 @@ use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Tracer};
 
-/// Log2 of the maximum number of samples per pixel in a launch, unless an estimator takes more.
-/// Samples of a pixel are neighbouring rays, which are coherent.
+/// Log2 of the maximum number of samples per pixel in a launch, which are coherent, by default.
 pub(crate) const MAX_SAMPLE_BITS: u32 = 4;
 
 /// Evaluates samples of pixels on the device: the device side of an integrator.
@@ -40,8 +38,7 @@ pub(crate) trait Estimator {
     /// `keep`: the batch is the first sample and [`Estimator::keeps_first`] is true.
     fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64>;
 
-    /// Runs launches in order and adds their results to the film that the parameters address. With
-    /// `keep` there is exactly one launch.
+    /// Runs launches in order, which add to the film of the parameters; with `keep` it is one.
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>>;
 }
 

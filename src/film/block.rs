@@ -1,5 +1,5 @@
-//! Blocks of the image: the pixels that one set of device buffers covers, so that device memory
-//! does not grow with the image.
+//! Blocks of the image: the pixels of one set of device buffers, which does not grow with the
+//! image.
 
 use super::camera::CameraRecord;
 pub use crate::interface::records::block::{BlockParams, TILE};

@@ -1,11 +1,11 @@
-//! The film: sums per pixel on the device, means and variances on the host. [`state`] has the exact
-//! sums that are saved to resume a render.
+//! The film: sums per pixel on the device, means and variances on the host. [`state`] has exact
+//! sums.
 //!
 //! A render is a number of *steps* ([`schedule`]): each brings some tiles to a number of samples,
 //! and between two of them a render may end or be saved. A step goes over the image in *blocks*
 //! ([`block`]), as many pixels as device buffers hold; a block in batches of samples
-//! ([`accumulate`]); a batch in launches of about 0.05 s each ([`pace`]). The image depends on none
-//! of these sizes.
+//! ([`accumulate`]); a batch in launches of about 0.05 s ([`pace`]). The image depends on none of
+//! these.
 
 pub mod accumulate;
 pub mod block;

@@ -1,5 +1,4 @@
-//! Adapts the size of launches: none should run longer than about a tenth of a second, because
-//! drivers reset devices that do not respond and users want to cancel.
+//! Adapts the size of launches to a twentieth of a second, so that drivers and users can interrupt.
 
 use crate::gpu::Timing;
 
@@ -7,8 +6,7 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Maximum number of rays in a launch on every device. Passes address results relative to a
-/// launch's first ray, so the tracer must not split launches.
+/// Maximum number of rays in a launch on every device, which the tracer must not split.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Chooses the size of launches from the measured time of earlier ones.

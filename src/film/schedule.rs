@@ -1,6 +1,6 @@
 //! Schedules the samples of a film: all at once, or in steps between which it is saved or tested
-//! for convergence. A step depends on the film alone, so a render that is saved and resumed takes
-//! the same samples as an uninterrupted one.
+//! for convergence. A step depends on the film alone, so that resumed renders take the same
+//! samples.
 
 use std::sync::Arc;
 

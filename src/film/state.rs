@@ -51,8 +51,7 @@ impl FilmState {
     }
 
     /// From a plane of each word ([`words`]) and the samples taken of each pixel, rows from the
-    /// top. `None` for states that no film writes: pixels of a tile with different numbers of
-    /// samples, or more samples rejected than taken.
+    /// top. `None` for states that no film writes, as with different numbers of samples in a tile.
     pub fn from_planes(size: [u32; 2], channels: usize, planes: &[Vec<u32>], samples: &[u32]) -> Option<Self> {
         let mut state = Self::new(size, channels);
         let record = record_words(channels);

@@ -1,5 +1,4 @@
-//! The tiles of an image that can contain geometry. Camera rays through the others hit nothing and
-//! need not be traced.
+//! The tiles of an image that can contain geometry. Camera rays through the others need no tracing.
 //!
 //! The screen bounding rectangle of every primitive is marked, with a margin for the rounding of
 //! the rays, so the mask is conservative: unmarked tiles are certain to be empty.
@@ -137,8 +136,7 @@ impl View {
         let corners = corners(bounds).map(|c| view.world_to_camera.transform_point3(c));
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
-        // as in oracle/rounding.rs: going to a group's space and back errs by the translation too,
-        // and the more the worse conditioned
+        // as in oracle/rounding.rs: going to an ill-conditioned group's space and back errs more
         let moved = || instances.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
         let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
         let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
@@ -228,8 +226,7 @@ mod tests {
     use super::*;
     use crate::scene::{Camera, Instance, Material, Mesh, Scene, TriangleMesh};
 
-    /// Two instances of a triangle whose vertices are `far` from their mesh's origin, both brought
-    /// back to the world's, and turned and stretched by `matrix`.
+    /// A triangle far from its mesh's origin, twice, brought back and deformed by `matrix`.
     fn brought_back(far: f64, matrix: DMat3) -> Scene {
         let positions = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| (p + DVec3::splat(far)).as_vec3()).to_vec();
         let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2]], ..Default::default() };
@@ -260,8 +257,7 @@ mod tests {
         assert!(near.margin < MIN_MARGIN + 0.01, "{}", near.margin);
         let scene = brought_back(1.0e6, DMat3::IDENTITY);
         let far = view(&scene).unwrap();
-        // a ray's origin is rounded by half an ulp of each coordinate, so its hit may be seen
-        // beside
+        // a ray's origin is rounded by half an ulp, so its hit may be seen beside
         let ulp = (1.0e6f32.next_up() - 1.0e6f32) as f64;
         let to_world = FlatScene::new(&scene).instances[0].to_world;
         let at = |p: DVec3| {

@@ -128,8 +128,7 @@ pub trait Integrator: Sync {
     /// Scene data that it needs in device memory.
     fn needs(&self, settings: &IntegratorSettings) -> Needs;
 
-    /// Streams that it will trace, as far as they are known before the scene is loaded: they are
-    /// compiled while the BVH is built.
+    /// Streams that it will trace, as far as known without the scene, to be compiled early.
     fn streams(&self, settings: &IntegratorSettings) -> Vec<&'static StreamShaders>;
 
     /// Approximate number of rays per sample, by which the quality of the BVH build is chosen.

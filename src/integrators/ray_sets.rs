@@ -1,5 +1,4 @@
-//! Sets of rays to measure tracers with: made by skylit's own passes, so that they are those of an
-//! image, in the order of the renderer.
+//! Sets of rays to measure tracers with: those of an image, in the order of skylit's own passes.
 
 use glam::DVec3;
 

@@ -50,9 +50,8 @@ pub fn check(rays: &[Ray]) -> Result<()> {
     }
 }
 
-/// Traces the set `repeats` times (at least once) after a warm-up, which finds the size of
-/// launches, and returns the hits. In mode [`Mode::Any`] those of occluded rays have t = 0 and no
-/// ids.
+/// Traces the set `repeats` times (at least once) after a warm-up, and returns the hits. In mode
+/// [`Mode::Any`] those of occluded rays have t = 0 and no ids.
 pub fn trace(
     tracer: &Tracer,
     rays: &[Ray],

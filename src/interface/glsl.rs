@@ -88,8 +88,7 @@ fn feature_set(set: &features::Declaration) -> String {
     text
 }
 
-/// Generates the numbers of reflection models and the functions that dispatch to them. Models that
-/// no material has are not compiled.
+/// Generates the numbers of reflection models, and functions that dispatch to those in use.
 fn bsdf_dispatch() -> String {
     // HAS_NAME
     let names: Vec<_> = features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
@@ -115,8 +114,7 @@ fn bsdf_dispatch() -> String {
     text
 }
 
-/// Generates the functions that dispatch to kinds of lights. Kinds that no light has are not
-/// compiled, and if all lights are of one kind, there is no branch.
+/// Generates the functions that dispatch to kinds of lights in use; one alone needs no branch.
 fn light_dispatch() -> String {
     let names: Vec<_> = features::LIGHTS
         .features

@@ -3,8 +3,7 @@
 //! Geometry is rasterized into a visibility buffer (one primitive id per pixel), and a compute
 //! shader intersects each ray with that one primitive and calls the stream's shader
 //! (`shaders/trace/visibility.glsl`). So the shader and its hits are those of traced rays; only at
-//! an edge within the rasterizer's sub-pixel precision may the neighbouring primitive be hit
-//! instead.
+//! an edge within the rasterizer's precision may the neighbouring primitive be hit instead.
 
 mod camera_rays;
 mod frustum;
@@ -48,10 +47,9 @@ choices! {
     }
 }
 
-/// Maximum number of instanced primitives per pixel at which rasterizing costs less than tracing:
-/// on CPU devices, and on others (not measured). Mesa's CPU driver takes 90 to 240 ns for a
-/// triangle, however small; at 0.43 a pixel both cost the same, at 0.28 drawing saves a third
-/// (`benches/studies/primary.rs`).
+/// Maximum instanced primitives per pixel at which rasterizing costs less than tracing: on CPU
+/// devices, and on others (not measured). Mesa's CPU driver takes 90 to 240 ns for a triangle; at
+/// 0.43 a pixel both cost the same, at 0.28 it saves a third (`benches/studies/primary.rs`).
 const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
 
 impl Primary {
@@ -110,13 +108,11 @@ struct Draws {
 }
 
 impl Raster {
-    /// Compiles the shaders for a scene and a stream of camera rays, for blocks of up to `size`
-    /// pixels.
+    /// Compiles the shaders for a scene and a stream of camera rays, for blocks up to `size`.
     ///
     /// # Errors
     /// [`crate::Error::Device`] when the device cannot rasterize, or not at this size;
-    /// [`crate::Error::Usage`] for a stream whose rays are not the camera's;
-    /// [`crate::Error::OutOfMemory`].
+    /// [`crate::Error::Usage`] for a stream of other rays; [`crate::Error::OutOfMemory`].
     pub fn new(tracer: &Tracer, shaders: &'static StreamShaders, size: [u32; 2]) -> Result<Self> {
         let (device, features) = (tracer.device(), tracer.features());
         let targets = Targets::new(device, size)?;
@@ -145,8 +141,7 @@ impl Raster {
         Ok(stats)
     }
 
-    /// Records the drawing of a view of the scene, timed as "raster draw", in place of the last
-    /// one.
+    /// Records the drawing of a view, timed as "raster draw", in place of the last one.
     ///
     /// # Errors
     /// [`crate::Error::Scene`] when the camera's transform is flat.

@@ -7,8 +7,7 @@ use super::settings::Settings;
 /// frame's place in all pixels, so more of them leave edges jagged.
 const FIRST_LONG: u32 = 4;
 
-/// A long frame after others has at most a part of so many of all samples at rest: who watches sees
-/// the image change as often as it changes visibly.
+/// A long frame has at most this part of all samples at rest, so that the image changes visibly.
 const PARTS: u32 = 8;
 
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames
@@ -66,8 +65,7 @@ impl FrameSamples {
         Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
     }
 
-    /// Samples of ambient visibility. Long frames take them as stills do, which is faster from
-    /// eight samples of a pixel on.
+    /// Samples of ambient visibility; long frames take eight or more of a pixel, as stills do.
     pub fn of_visibility(settings: &Settings, pixels: u64) -> Self {
         // half a second on two cores, where that is enough for eight; in large images seconds
         const MAX_PER_PIXEL: u64 = 16;
@@ -157,8 +155,7 @@ impl FrameSamples {
         self.forgets_short && self.is_long(resting)
     }
 
-    /// Mean number of samples of a pixel that count in all frames since the image came to rest, but
-    /// for the first; rounded down.
+    /// Mean number of samples of a pixel at rest but for the first frame's; rounded down.
     pub fn since_rest(&self, resting: u32) -> u64 {
         let short = resting.min(self.first_long - 1);
         if self.has_forgotten_short(resting) {

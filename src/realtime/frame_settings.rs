@@ -152,8 +152,7 @@ impl FrameSettings {
         self.animate.as_deref().or(self.time.map(|_| "0"))
     }
 
-    /// The settings of the pipeline: the preset's, with the settings given, for ambient occlusion
-    /// with settings `ao`.
+    /// The settings of the pipeline: the preset's, with those given, and `ao`.
     ///
     /// # Errors
     /// [`Error::Usage`] for settings without effect together.

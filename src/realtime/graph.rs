@@ -1,6 +1,5 @@
-//! The frame graph: passes declare which resources they read and write. From these declarations
-//! follow memory allocation, barriers, timings, and which passes are skipped because no input has
-//! changed.
+//! The frame graph: passes declare which resources they read and write. From that follow memory,
+//! barriers, timings, and which passes are skipped because no input has changed.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -213,8 +212,7 @@ impl Graph {
         Ok(false)
     }
 
-    /// Rays of the last frame, as the device counted them, or of passes whose number of rays the
-    /// host knows.
+    /// Rays of the last frame, as the device or the host counted them.
     ///
     /// # Errors
     /// Those of the device.
@@ -225,8 +223,7 @@ impl Graph {
         Ok(self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum())
     }
 
-    /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that
-    /// moved.
+    /// Moves the lights to where they are in `scene`. Returns true if any have moved.
     ///
     /// # Errors
     /// Those of the passes ([`Pass::move_lights`]).

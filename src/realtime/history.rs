@@ -31,17 +31,15 @@ impl Motion {
     }
 }
 
-/// Which paths the frames take of the sequence of each pixel. A pixel takes them one after the
-/// other, also where it is sampled in every second or fourth frame only: all samples of a sequence
-/// are more even than every fourth of them.
+/// The paths that frames take of the sequence of each pixel: one after the other, also where it is
+/// sampled in every fourth frame only, because all samples of a sequence are more even.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PathSequence {
     /// Index of the next path.
     pub first: u32,
     /// The paths since the image came to rest are a block of the sequence, from its beginning.
     pub in_block: bool,
-    /// Maximum number of paths of a pixel since then. The other pixels of the pattern follow with
-    /// paths of the same indices.
+    /// Maximum number of paths of a pixel since then, which other pixels of the pattern follow.
     pub of_pattern: u32,
 }
 

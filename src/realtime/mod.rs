@@ -83,8 +83,7 @@ pub struct FrameStats {
 }
 
 impl FrameStats {
-    /// Device seconds of the passes that trace rays, by which the quality of refitted hierarchies
-    /// is judged ([`Tracer::traced`]).
+    /// Device seconds of passes that trace rays, by which hierarchies are judged.
     pub fn tracing_seconds(&self) -> f64 {
         self.timings.iter().filter(|t| t.label.ends_with(" trace") || t.label == "gbuffer").map(|t| t.seconds).sum()
     }
@@ -130,8 +129,7 @@ impl DisplayPassKind {
 const SURFACES_STAGE: usize = 0;
 
 /// Share of the surfaces in view that the previous image has shown, below which a frame begins
-/// anew: the first frame of an image has its samples where they say most, and those of a frame that
-/// goes on with histories of few pixels are worse in all others.
+/// anew: first frames have their samples where they say most.
 const MIN_KNOWN: f64 = 1.0 / 3.0;
 
 /// Pixels by which that share is known.
@@ -144,11 +142,10 @@ impl Realtime {
     }
 
     /// Creates the pipeline for images of `size` pixels of the tracer's scene. `lights` are the
-    /// positions of the scene's point lights relative to its origin, which Larsen's pipeline needs.
+    /// positions of the scene's point lights relative to its origin, for Larsen's pipeline.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling
-    /// shaders.
+    /// [`Error::Usage`] for wrong settings, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
         let settings = &settings.with_launches_of(&tracer.device().info);
@@ -160,12 +157,11 @@ impl Realtime {
     }
 
     /// Creates the pipeline for frames of radiance. The tracer must have been built from `flat`
-    /// with [`crate::tracer::Needs::shading`]; `options` are those of paths, whose number per pixel
-    /// is [`Settings::rays_per_pixel`].
+    /// with [`crate::tracer::Needs::shading`]; paths have `options`, but their own number per
+    /// pixel.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range or without effect on radiance,
-    /// [`Error::OutOfMemory`], and those of compiling shaders.
+    /// [`Error::Usage`] for wrong settings, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn radiance(
         tracer: &Tracer,
         flat: &FlatScene,
@@ -207,19 +203,16 @@ impl Realtime {
         self.signal.channels()
     }
 
-    /// Notes that lights or materials have changed since the last frame: histories of radiance
-    /// count in the next one as far as its samples do not differ from them, and for eight frames at
-    /// most. Those of ambient visibility do not depend on them.
+    /// Notes that lights or materials have changed: histories of radiance count in the next frame
+    /// as far as its samples do not differ, for eight frames at most.
     pub fn change_light(&mut self) {
         if self.signal.depends_on_light() {
             self.history.change_light();
         }
     }
 
-    /// Turns the environment map from the next frame on, and calls [`Realtime::change_light`]:
-    /// `to_map` is the rotation from world directions to the map's
-    /// ([`crate::scene::EnvironmentMap::to_map`]). No other environment has a direction, and
-    /// ambient visibility depends on none.
+    /// Turns the environment map from the next frame on, which changes light: `to_map` is the
+    /// rotation from world directions to the map's ([`crate::scene::EnvironmentMap::to_map`]).
     pub fn turn_environment(&mut self, to_map: DMat3) {
         if self.signal.depends_on_light() {
             self.history.environment_turn = Some(to_map);
@@ -227,13 +220,11 @@ impl Realtime {
         }
     }
 
-    /// Moves lights, and surfaces that emit light, to where they are in `scene` from the next frame
-    /// on, and calls [`Realtime::change_light`] if any has moved. `scene` is the tracer's in the
-    /// pose to which that was updated. Ambient visibility depends on no light.
+    /// Moves lights and emissive surfaces to where they are in `scene` from the next frame on, and
+    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated.
     ///
     /// # Errors
-    /// Those of the device; [`Error::Scene`] where lights were switched on or off, which needs
-    /// other shaders.
+    /// Those of the device; [`Error::Scene`] where lights were switched, which needs other shaders.
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         if self.graph.move_lights(tracer, scene)? {
             self.change_light();
@@ -251,8 +242,7 @@ impl Realtime {
         &self.settings
     }
 
-    /// Number of frames at rest after which the image no longer changes; `None`: with every frame,
-    /// or it is pixels that come to rest, each on its own.
+    /// Number of frames at rest after which the image no longer changes; `None`: it always does.
     pub fn frames_to_rest(&self) -> Option<u32> {
         self.signal.frames_to_rest(&self.settings, &self.frame_samples)
     }
@@ -445,14 +435,12 @@ impl Realtime {
         })
     }
 
-    /// Sets the buffer that the next frames write to [`Realtime::displayed`], in the same
-    /// submission; `None`: none, at no cost. It may change before every frame: the first call
-    /// compiles the pass, later ones write its parameters. The first one with [`DisplayMode::Rays`]
-    /// discards the history.
+    /// Sets the buffer that the next frames write to [`Realtime::displayed`]; `None`: none. It may
+    /// change before every frame: the first call compiles the pass, later ones write parameters.
+    /// The first one with [`DisplayMode::Rays`] discards the history.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a buffer that these settings do not produce, and those of compiling the
-    /// shader.
+    /// [`Error::Usage`] for a buffer that does not exist, and those of compiling the shader.
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             self.signal.check_display(display.shown, &self.settings)?;

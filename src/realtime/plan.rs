@@ -62,8 +62,7 @@ pub struct SamplePlacement {
     pub spreads: bool,
     /// Rays through the frame's place in each pixel are those of the previous frame.
     pub keeps_offset: bool,
-    /// Index of the first sample in the pixel's sequence. (The passes of ambient visibility in
-    /// short frames go by [`FramePlan::number`].)
+    /// Index of the first sample in the pixel's sequence, but for short frames of visibility.
     pub first_sample: u32,
     /// The paths that the pixels take.
     pub paths: PathSequence,
@@ -78,8 +77,7 @@ pub trait Signal: Sync {
         1
     }
 
-    /// Returns how many samples the frames of an image of so many pixels take. `is_cpu`: the device
-    /// is a processor, as opposed to a GPU.
+    /// Returns how many samples the frames of an image of so many pixels take.
     fn frame_samples(&self, settings: &Settings, pixels: u64, _is_cpu: bool) -> FrameSamples {
         FrameSamples::of_visibility(settings, pixels)
     }
@@ -97,8 +95,7 @@ pub trait Signal: Sync {
         false
     }
 
-    /// Returns true if each pixel has a history of samples, by which passes rest, and frames that
-    /// were interrupted are taken back.
+    /// Returns true if each pixel has a history of samples, which can be taken back.
     fn has_pixel_histories(&self) -> bool {
         true
     }
@@ -108,20 +105,17 @@ pub trait Signal: Sync {
         settings.history > 1
     }
 
-    /// Returns the number of frames at rest after which the image no longer changes; `None`: it
-    /// does with every frame, or it is pixels that come to rest, each on its own.
+    /// Returns the number of frames at rest after which the image does not change, if any.
     fn frames_to_rest(&self, settings: &Settings, samples: &FrameSamples) -> Option<u32> {
         if settings.converges() { Some(samples.frames_for(settings.rest_samples)) } else { settings.frames_to_rest() }
     }
 
-    /// Returns the number of frames at rest in which each pixel has as many samples as
-    /// [`FrameSamples`] counts for one.
+    /// Returns the number of frames at rest in which each pixel has the samples of one.
     fn rest_period(&self, _settings: &Settings) -> u32 {
         1
     }
 
-    /// Returns true if the first frame of an image is one at rest: there are no histories to go on
-    /// with, and a place of its own for each path says more.
+    /// Returns true if the first frame of an image is one at rest, with offsets of each path.
     fn begins_at_rest(&self, _samples: &FrameSamples) -> bool {
         false
     }
@@ -730,8 +724,7 @@ mod tests {
             frames.camera = camera_at(0.01 * k as f32);
             frames.frame();
         }
-        // in motion they take the sequence from its beginning: two of the first frame, then one
-        // each
+        // in motion they take the sequence from its beginning: two, then one each
         assert_eq!(frames.history.paths.first, 2 + 4);
         let mut next = 1 << 12;
         for plan in frames.frames(40) {

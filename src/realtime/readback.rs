@@ -17,9 +17,8 @@ pub struct Surface {
 }
 
 impl Realtime {
-    /// Reads the last frame, rows from the top: ambient visibility of each pixel, or linear
-    /// radiance, red, green and blue. Ambient visibility is 0 for background; of a pixel that shows
-    /// some, it is the mean over the pixel.
+    /// Reads the last frame, rows from the top: ambient visibility of each pixel, 0 for background,
+    /// or linear radiance, red, green and blue. At edges it is the mean over the surfaces.
     pub fn result(&self) -> Result<Vec<f32>> {
         let channels = self.channels();
         match self.resolved()? {

@@ -1,5 +1,4 @@
-//! Histories of a pipeline of another size, so that an image whose resolution changes does not
-//! begin with noise.
+//! Histories of a pipeline of another size, so that a change of size does not begin with noise.
 
 use super::Realtime;
 use super::resources::Resource;
@@ -22,9 +21,8 @@ const REMEMBERED: [Resource; 6] = [
     Resource::ResolvedHistory,
 ];
 
-/// Share of the surfaces in view from which on own histories, of an image at rest, are the better
-/// ones: coarser ones are of motion, and so noisier. Of what own ones lack, mirrors and glass
-/// mostly, the others know little more.
+/// Share of the surfaces in view from which own histories, of an image at rest, are better: coarser
+/// ones are of motion, and so noisier.
 const SEEN_ENOUGH: f64 = 0.75;
 
 /// Largest side of images that are resampled, pixels: the shader multiplies two in 32 bits.

@@ -281,8 +281,7 @@ impl Resources {
     }
 
     /// Allocates buffers of resources that stages write and that have none yet. `stages` has the
-    /// uses of each stage's passes. Resources that no pass writes have no buffer, and the address
-    /// 0.
+    /// uses of each stage's passes. Resources that no pass writes have no buffer and address 0.
     pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Vec<ResourceUse>]) -> Result<()> {
         // first and last stage that use a resource, in the order in which they are first written
         let mut spans: Vec<(Resource, [usize; 2])> = Vec::new();

@@ -122,8 +122,7 @@ impl<'a> FrameSequence<'a> {
         Self { held: seconds, ..self }
     }
 
-    /// The motion that the scene must be flattened with
-    /// ([`crate::accel::flatten::FlatScene::with_motion`]).
+    /// The motion that the scene must be flattened with.
     ///
     /// # Errors
     /// [`Error::Usage`] when the scene has no such animation.
@@ -131,8 +130,7 @@ impl<'a> FrameSequence<'a> {
         self.played.as_ref().map_or(Ok(Motion::default()), |p| p.rig.motion(p.animation))
     }
 
-    /// Updates the tracer to a frame, and returns the camera and the statistics of the update.
-    /// Animations loop.
+    /// Updates the tracer to a frame, and returns the camera and statistics. Animations loop.
     ///
     /// # Errors
     /// Those of [`Tracer::update`].
@@ -162,8 +160,7 @@ impl<'a> FrameSequence<'a> {
         Ok((self.motion.camera_at(camera, frame), stats))
     }
 
-    /// Returns true if the camera's motion has a cut between the last frame and the one before it:
-    /// what is known of earlier images says nothing of the last one.
+    /// Returns true if the camera was cut before the last frame: no earlier image tells of it.
     pub fn has_cut(&self) -> bool {
         self.has_cut
     }

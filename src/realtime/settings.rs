@@ -204,8 +204,7 @@ impl Settings {
     /// Positions within a pixel that antialiasing averages at rest, in as many frames.
     const PLACES: u32 = 64;
 
-    /// Number of frames at rest after which the image no longer changes; `None`: it always does, or
-    /// pixels come to rest each on their own.
+    /// Number of frames at rest after which the image no longer changes, if there is one.
     pub fn frames_to_rest(&self) -> Option<u32> {
         let period = self.resolution.period();
         if self.converges() {
@@ -298,9 +297,9 @@ choices! {
 }
 
 impl Preset {
-    /// Whether a renderer's frames are antialiased by default. The error against antialiased images
-    /// is lower then, at rest and in motion (docs/realtime.md). [`Preset::settings`] samples pixel
-    /// centres, to measure the pipeline alone.
+    /// Whether a renderer's frames are antialiased by default, which lowers their error
+    /// (docs/realtime.md). [`Preset::settings`] samples pixel centres, to measure the pipeline
+    /// alone.
     pub fn antialiases(self) -> bool {
         matches!(self, Self::Fast | Self::Balanced | Self::Quality)
     }

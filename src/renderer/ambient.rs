@@ -1,5 +1,4 @@
-//! Samples of ambient light: how an image changes with the radius and falloff of ambient occlusion,
-//! and with the ambient colour.
+//! Samples of ambient light: how an image changes with radius and falloff of ambient occlusion.
 
 use super::complete::Completed;
 use super::still::scene_warnings;
@@ -12,8 +11,7 @@ use crate::scene::Motion;
 
 impl Renderer {
     /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name,
-    /// to their nearest hits, and hands the distances to `take`: by them the image is known for
-    /// every radius, falloff and ambient colour.
+    /// to their nearest hits. The distances that `take` receives tell the image for every radius.
     ///
     /// # Errors
     /// As [`Renderer::still`].

@@ -21,8 +21,7 @@ pub fn of_surfaces(image: &Accumulated, channels: usize) -> Option<f64> {
     (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
 }
 
-/// A warning about an image of this mean, and a remedy; `None` if it is fine. `capabilities` are of
-/// its integrator, `exposure` in stops.
+/// A warning about an image of this mean, with a remedy; `None` if it is fine. `exposure` in stops.
 pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<String> {
     use Capability::{AmbientOcclusion, SceneLights, WhiteSky};
     let [least, most] = RANGE;

@@ -1,5 +1,4 @@
-//! A camera as numbers, for metadata and reports: position and direction as settings have them, and
-//! the matrices of the OpenEXR standard.
+//! A camera as numbers, for metadata and reports: as settings have it, and as matrices of OpenEXR.
 
 use glam::{DMat4, DVec3};
 use serde_json::{Value, json};

@@ -143,8 +143,7 @@ impl Renderer {
     }
 }
 
-/// The image size of the scene's camera, and a sentence on it; `None` where settings or scene give
-/// one, or it is the default.
+/// The image size of the scene's camera, and a sentence on it; `None` if given or the default.
 fn size_of_camera(settings: &RenderSettings, scene: &Scene) -> Option<([u32; 2], String)> {
     if settings.image.size.or(scene.hints.size).is_some() {
         return None;

@@ -95,8 +95,7 @@ pub struct Resolved {
 /// which prevails. `confine` says where the latter, and files that it names, must lie.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may
-/// not choose, and for a file that lies elsewhere.
+/// Those of [`DefaultsFile::load`], and [`Error::Input`] if a scene's folder may not choose that.
 pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
@@ -283,8 +282,7 @@ fn is_camera(name: &str) -> bool {
     all.editable().iter().any(|s| s.name == name)
 }
 
-/// The settings of `own` that hold with those `above`. Unlike on the command line, options of the
-/// compute tracer do not choose it.
+/// The settings of `own` that hold with those `above`; none chooses the compute tracer by itself.
 fn holding_device(own: &DeviceSettings, above: &DeviceSettings) -> DeviceSettings {
     let holds = |device: &DeviceSettings| {
         let chooses = above.compute_only_option().is_none() && device.compute_only_option().is_some();

@@ -75,9 +75,8 @@ impl<'a> Denoising<'a> {
         self.chosen.denoiser.name()
     }
 
-    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`,
-    /// `noisy.G`, `noisy.B`, or `noisy.Y`. An interruption ends it, unless `control` keeps the
-    /// image so far, which is then denoised, too.
+    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`
+    /// and so on. An interruption ends it, unless `control` keeps the image so far, denoised, too.
     pub fn channels(
         &self,
         accumulated: &Accumulated,

@@ -107,8 +107,7 @@ struct Lighting {
 }
 
 impl Renderer {
-    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts, which takes about as
-    /// long.
+    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts.
     ///
     /// # Errors
     /// Those of [`load::load`] and [`Device::open`].

@@ -20,8 +20,7 @@ use crate::scene::{Camera, RenderHints};
 use crate::settings::Capability;
 use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 
-/// Seconds of a run. Its parts add up to the total; the others lie within them, and loading and
-/// starting the device overlap.
+/// Seconds of a run. Its parts add up to the total; the others lie within them, and may overlap.
 #[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Seconds {
     /// Loading the scene.
@@ -48,8 +47,7 @@ fn as_map<S: serde::Serializer>(parts: &[(&'static str, f64)], serializer: S) ->
 }
 
 impl Seconds {
-    /// Ends the run after `write` seconds of writing files; `total` is the time of all. Time that
-    /// no part accounts for is the part `other`.
+    /// Ends the run of `total` seconds with `write` seconds of files; the part `other` is the rest.
     pub fn finish(&mut self, write: f64, total: f64) {
         (self.write, self.total) = (write, total);
         self.parts.push(("write", write));
@@ -444,8 +442,7 @@ impl FramesReport {
         out
     }
 
-    /// Median and 95th percentile of the milliseconds per frame. Skipped frames, whose image had
-    /// converged, do not count unless all are of them.
+    /// Median and 95th percentile of the milliseconds per frame, without skipped ones if possible.
     pub fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
         let of = |frames: &mut dyn Iterator<Item = &FrameReport>| -> Vec<f64> { frames.map(|f| 1e3 * f.seconds).collect() };

@@ -1,5 +1,4 @@
-//! All settings of a render: the command line of `skylit render`, the metadata of images, and
-//! files.
+//! All settings of a render: command line of `skylit render`, metadata of images, and files.
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -153,8 +152,7 @@ impl CameraSettings {
     /// Chooses the camera for images of `aspect` = width / height.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] if the scene
-    /// has neither a camera nor geometry.
+    /// [`Error::Usage`] for a camera that does not exist, [`Error::Scene`] without any geometry.
     pub fn choose(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
         let camera = self.choose_unclipped(survey, aspect)?;
         Ok(Camera { clip: self.clip.unwrap_or(camera.clip), ..camera })
@@ -236,8 +234,7 @@ impl FilmSettings {
 const ASPECTS: std::ops::RangeInclusive<f64> = 1.0 / 64.0..=64.0;
 
 /// The image size of an aspect ratio (width over height) with about as many pixels as
-/// [`DEFAULT_SIZE`], within three per cent of a side as close to the ratio as whole numbers come;
-/// `None` for a ratio that no image has.
+/// [`DEFAULT_SIZE`], within three per cent of a side; `None` for a ratio that no image has.
 pub fn size_of_aspect(aspect: f64) -> Option<[u32; 2]> {
     let pixels = DEFAULT_SIZE.iter().map(|&n| f64::from(n)).product::<f64>();
     let height = ASPECTS.contains(&aspect).then(|| (pixels / aspect).sqrt())?;
@@ -456,8 +453,7 @@ impl RenderSettings {
         if self.is_still_sequence() { None } else { self.frames.given().into_iter().next() }
     }
 
-    /// Returns true for stills, one for each frame of a time line: samples per pixel are given, and
-    /// no setting that only frames in real time have.
+    /// Returns true for stills, one per frame: `spp`, and nothing that only real-time frames have.
     pub fn is_still_sequence(&self) -> bool {
         let given = self.frames.given();
         self.image.spp.is_some() && !given.is_empty() && given.iter().all(|s| s.applies.stills)

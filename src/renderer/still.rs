@@ -112,8 +112,7 @@ impl Renderer {
     /// Renders a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of
-    /// the device and of `control`.
+    /// [`Error::Usage`] for settings that do not fit; those of the device and of `control`.
     pub fn still(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Still> {
         self.still_with(settings, StillExtras::default(), control, &mut |_| Ok(()))
     }
@@ -390,8 +389,7 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
-/// Everything that must agree for a render to be resumed: all that its samples depend on, except
-/// its size. `scene`: the scene's fingerprint, if the film's state is kept.
+/// All that must agree to resume a render. `scene`: its fingerprint, if the state is kept.
 pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Option<String>) -> Identity {
     let has_environment = scene.is_some() && integrator.sees_environment();
     let environment = has_environment.then(|| fingerprint::of_environment(&job.scene.environment));

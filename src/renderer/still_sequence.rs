@@ -1,5 +1,4 @@
-//! Stills of a scene and a camera over time, one for each frame, which frames in real time
-//! approximate.
+//! Stills of a scene and a camera over time, which frames in real time approximate.
 
 use std::time::Instant;
 

@@ -17,8 +17,7 @@ pub enum Length {
 }
 
 impl Length {
-    /// Length in scene units, `None` for [`Length::Auto`]; `diagonal` is that of the scene's
-    /// bounds.
+    /// Length in scene units, or `None` for [`Length::Auto`]. `diagonal`: of the scene's bounds.
     pub fn units(self, diagonal: f64) -> Option<f64> {
         match self {
             Self::Units(units) => Some(units),

@@ -161,8 +161,7 @@ fn list(names: &[&str]) -> String {
 }
 
 /// Checks that each setting has an effect on what `integrator` renders: real-time frames if
-/// `frames` is the setting that selects them, else a still. Errors name the integrators of `all`
-/// that have it.
+/// `frames` is the setting that selects them, else a still. Errors name others of `all`.
 ///
 /// # Errors
 /// [`Error::Usage`] for the first setting without effect.
@@ -189,8 +188,7 @@ pub fn check(given: &[GivenSetting], integrator: &Integrator, all: &[Integrator]
 }
 
 /// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo), level;`, each
-/// with its help text as documentation. The level is `basic` or `research`, or left out
-/// ([`Level`]).
+/// with its help text as documentation. The [`Level`] is `basic` or `research`, or left out.
 ///
 /// A setting is an `Option`, a `bool` or a `Vec`; the default value means that it was not given.
 macro_rules! settings {

@@ -28,8 +28,7 @@ struct Cache {
 /// Maximum number of cached shaders; the oldest are removed first.
 const MAX_ENTRIES: usize = 1500;
 
-/// Optimization takes three quarters of the compile time. Live shaders go without, for short edit
-/// cycles: the driver optimizes, too.
+/// Optimization takes three quarters of the compile time, so live shaders go without.
 fn optimization(source: &Source) -> OptimizationLevel {
     if cfg!(feature = "live-shaders") || !source.is_optimized() {
         OptimizationLevel::Zero

@@ -33,8 +33,7 @@ impl Shader {
     /// SPIR-V that build.rs has compiled, or with `live-shaders` from the files as they are now.
     ///
     /// # Errors
-    /// None, except with the feature `live-shaders`: [`crate::Error::Usage`] with the compiler's
-    /// message.
+    /// None but with `live-shaders`: [`crate::Error::Usage`] with the compiler's message.
     ///
     /// # Panics
     /// If no list of `registry.rs` names the shader.

@@ -66,7 +66,6 @@ pub const STREAMS: &[&StreamShaders] = &[
 
 /// The mean over frames whose samples lie at different places within the pixels.
 pub static ANTIALIAS: ComputeShader = ComputeShader::new("antialias");
-/// A frame's occlusion rays, distributed over its pixels.
 /// Radiance of each pixel, of its filtered parts.
 pub static COMPOSE: ComputeShader = ComputeShader::new("compose");
 /// The spatial filter of radiance.

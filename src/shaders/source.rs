@@ -1,5 +1,4 @@
-//! Sources of shaders: a tracer's template and a pass make one text. Used by build.rs and by the
-//! program.
+//! Sources of shaders: a tracer's template and a pass make one text.
 
 use std::fmt;
 use std::path::Path;
@@ -8,8 +7,7 @@ use std::sync::OnceLock;
 /// Invocations per workgroup of a stream.
 pub const LANES: u32 = 64;
 
-/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work
-/// (shaders/trace/spread.glsl).
+/// Number of distant parts of a dispatch from which runs of workgroups take their work.
 pub const SPREAD: u32 = 16;
 
 /// Consecutive workgroups that take neighbouring work, one ray per invocation each: a prefetch.
@@ -60,8 +58,7 @@ pub enum Rays {
     /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility
     /// can be rasterized instead.
     Camera,
-    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory
-    /// (shaders/trace/known.glsl).
+    /// As [`Rays::Camera`]; or the hits are in memory (shaders/trace/known.glsl).
     CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,

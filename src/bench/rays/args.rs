@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::accel::BuildPreset;
 
-    #[derive(Parser)]
+    #[derive(Debug, Parser)]
     struct Alone {
         #[command(flatten)]
         args: BenchRaysArgs,

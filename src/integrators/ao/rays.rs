@@ -1,5 +1,4 @@
-//! The rays of samples of ambient occlusion: camera rays, and occlusion rays from their hits
-//! (`primary`, `occlusion`).
+//! The rays of samples of ambient occlusion: camera rays, and occlusion rays from their hits.
 
 use super::{Attenuation, NO_HIT};
 use crate::error::Result;

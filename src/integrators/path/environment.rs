@@ -1,5 +1,4 @@
-//! Environments in device memory: texels, and the table of importance sampling
-//! (shaders/path/map.glsl).
+//! Environments in device memory: texels, and the table that is sampled (shaders/path/map.glsl).
 
 use std::sync::Arc;
 

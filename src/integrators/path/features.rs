@@ -1,5 +1,4 @@
-//! Features that lights and options require of the path tracer's shaders; others are specialized
-//! out.
+//! Features that lights and options require of paths' shaders; others are specialized out.
 
 use super::lights::Lights;
 use super::{PathOptions, Strategy, media};

@@ -46,8 +46,7 @@ impl LightSources {
         Ok(Self { environment, lights, builder })
     }
 
-    /// Features of shaders that the lights, options and scene require, and the kinds of lights that
-    /// light sampling must know. `cones`: textures are filtered by ray cones.
+    /// Features of shaders that lights, options and scene require, and the kinds of lights.
     pub fn features(&self, flat: &FlatScene, options: &PathOptions, cones: bool) -> (PathFeatures, LightKinds) {
         let has_map = self.environment.map.texels != 0;
         let (features, mut light_kinds) = features::features(options, flat, &self.lights, has_map, cones);

@@ -1,5 +1,5 @@
 //! Path tracing: the ground truth that ambient occlusion approximates. The streams `path_camera`,
-//! `path_bounce` and `path_shadow` and the pass `path_resolve`, several samples of each pixel at a
+//! `path_bounce` and `path_shadow` and the pass `path_resolve`, several samples of a pixel at a
 //! time.
 //!
 //! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades their hits,
@@ -140,8 +140,7 @@ impl PathIntegrator {
         self.paths.move_lights(tracer.device(), scene).map(drop)
     }
 
-    /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created
-    /// with.
+    /// Renders `spp` paths per pixel. `tracer` must be the one of [`PathIntegrator::new`].
     ///
     /// # Errors
     /// Those of the device; [`Error::Usage`] for more paths than `options.samples.spp`;

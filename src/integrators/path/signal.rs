@@ -1,6 +1,5 @@
 //! Paths for frames in real time: diffuse reflection is kept apart from the rest, so that both can
-//! be filtered, and rays of their own find the surfaces by which they are reprojected and filtered
-//! ([`SignalPaths::surfaces`]).
+//! be filtered, and guide rays find surfaces to reproject by ([`SignalPaths::surfaces`]).
 
 use glam::DMat3;
 
@@ -116,8 +115,7 @@ impl SignalPaths {
         self.paths.move_lights(tracer.device(), scene)
     }
 
-    /// Returns true if paths can begin at [`BlockParams::known_hits`]: if they share camera rays,
-    /// without a lens or surfaces of stochastic alpha.
+    /// Returns true if paths can begin at [`BlockParams::known_hits`], as they share camera rays.
     pub fn can_begin_at_known(&self) -> bool {
         self.paths.pipelines.known.is_some()
     }
@@ -139,8 +137,8 @@ impl SignalPaths {
         self.paths.write_block(&self.block)
     }
 
-    /// Has the next launches take `1 << bits` pixels of each listed one ([`BlockParams::listed`])
-    /// beyond [`BlockParams::cells`].
+    /// Has later launches take `1 << bits` more pixels of each listed one
+    /// ([`BlockParams::listed`]).
     ///
     /// # Errors
     /// Those of the device.

@@ -1,5 +1,4 @@
-//! `antialias`: the mean over frames whose samples lie at different places within the pixels, and
-//! at rest what the image converges to.
+//! `antialias`: the mean over frames of moving sample positions; at rest the converging image.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
@@ -19,8 +18,7 @@ const RADIANCE_FRAMES: f32 = 4.0;
 const STILL_FRAMES: f32 = 16.0;
 /// The same after lights or materials have changed.
 const NEW_LIGHT_FRAMES: f32 = 2.0;
-/// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs
-/// from the one before by the edges that its filter sees.
+/// Minimum weight of a frame of radiance at rest, which differs in its filter's edges.
 const MIN_WEIGHT: f32 = 0.25;
 /// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
 const CLAMP_WIDTH: f32 = 1.25;

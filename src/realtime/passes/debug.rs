@@ -1,6 +1,5 @@
-//! Debug views: passes that write the displayed image themselves. They are compiled and run only
-//! for frames that show them, and no other pass reads what they write. Each is a file here and a
-//! variant of [`DisplayMode`], which [`super::debug_view`] brings together.
+//! Debug views: passes that write the displayed image themselves, compiled and run only for frames
+//! that show them. Each is a file here and a variant of [`DisplayMode`] ([`super::debug_view`]).
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};

@@ -1,5 +1,4 @@
-//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and
-//! without alpha for files.
+//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory.
 
 use super::debug_view;
 use crate::colour::srgb_byte;
@@ -75,8 +74,7 @@ struct DisplayPass {
     thresholds: Buffer,
 }
 
-/// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose
-/// input keeps its memory until this pass; else for all other buffers.
+/// The pass over all pixels, after all others; for [`DisplayMode::Rays`] alone if `shows_rays`.
 pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = DisplayPass {

@@ -1,5 +1,5 @@
-//! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts.
-//! The host reads after some bounces how many paths are left.
+//! `paths`: paths of the pixels that are sampled, and means of their parts. The host counts paths
+//! left.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! `radiance_filter`: averages diffuse reflection, and then the rest, over neighbours on the same
-//! surface (the shader `denoise`, with which stills are denoised).
+//! `radiance_filter`: averages diffuse reflection, and the rest, over neighbours (shader
+//! `denoise`).
 
 use std::sync::Arc;
 
@@ -14,8 +14,7 @@ use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// At rest the box has so many pixels at least, however many samples they have: what detail is, and
-/// what noise, is told by them.
+/// Minimum pixels of the box at rest, however many samples: they tell detail from noise.
 const MIN_PIXELS: f32 = 9.0;
 
 /// One step of the filter of one part.

@@ -1,6 +1,5 @@
-//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills:
-//! `primary` and `occlusion`. In place of the passes that a frame in motion needs, whose samples
-//! lie at one place in their pixels and which take longer than as many samples of a still.
+//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills,
+//! `primary` and `occlusion`, which take less time than the passes of frames in motion.
 
 use crate::error::Result;
 use crate::film::block::Block;
@@ -15,8 +14,7 @@ use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, LANES};
 use crate::tracer::Push;
 
-/// Added to the seed, so that frames at rest and a still of the same seed, which may be its
-/// reference, have samples of their own.
+/// Added to the seed, so that frames at rest do not share samples with a still, their reference.
 const SEED: u32 = 0x7265_7374;
 
 /// The pipelines and their memory, made when the first long frame comes.

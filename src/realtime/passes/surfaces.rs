@@ -1,5 +1,4 @@
-//! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters
-//! light, seen directly or by mirrors and glass, its material, and what is seen directly.
+//! `surfaces`: the G-buffer of radiance: surfaces behind pixels that scatter light, and materials.
 
 use std::sync::Arc;
 

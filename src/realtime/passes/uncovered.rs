@@ -1,7 +1,6 @@
-//! Pixels whose surface was not seen in the previous image. Where a camera or an object in motion
-//! uncovers something, one path would have to do; these pixels have some more
-//! ([`Counts::listed_bits`]), in the same launch as those of all pixels. The pass `surfaces` lists
-//! them, and `paths` reads the list.
+//! Pixels whose surface was not seen in the previous image, which a camera or object in motion
+//! uncovers. They have more paths ([`Counts::listed_bits`]) in the launch of all pixels. The pass
+//! `surfaces` lists them, and `paths` reads the list.
 
 use std::sync::Arc;
 

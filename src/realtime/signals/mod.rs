@@ -1,5 +1,4 @@
-//! The signals that frames are made of, a type each, which owns its stages: ambient visibility,
-//! radiance, and the pipeline of Larsen (2019).
+//! The signals that frames are made of: ambient visibility, radiance, and Larsen's pipeline.
 
 pub mod larsen;
 pub mod radiance;

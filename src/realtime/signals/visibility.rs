@@ -27,8 +27,7 @@ impl AmbientVisibility {
     /// Compiles the pipeline for images of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Usage`] for more rays than a frame can have, [`Error::OutOfMemory`], and those of
-    /// compiling shaders.
+    /// [`Error::Usage`] for too many rays, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn pipeline(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Result<Pipeline> {
         let block = Block { origin: [0, 0], size };
         check_rays(block, settings)?;

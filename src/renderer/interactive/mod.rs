@@ -1,5 +1,5 @@
-//! A scene for viewers: views of it whose camera, time and settings change at any moment, rendered
-//! in short steps that can be interrupted.
+//! A scene for viewers: views of it that change at any moment, rendered in short, interruptible
+//! steps.
 //!
 //! [`Interactive`] holds the scene's tracers, [`View`] an image of it in progress. Several views
 //! share tracers, pipelines and the pose of the scene.
@@ -167,8 +167,7 @@ impl<'r> Interactive<'r> {
         }
     }
 
-    /// The camera that is chosen by what it would see, even if the file has some
-    /// ([`framing::choose`]).
+    /// The camera that is chosen by what it would see ([`framing::choose`]), in any scene.
     ///
     /// # Errors
     /// As [`Self::choose_camera`].

@@ -190,8 +190,7 @@ impl View {
         f64::from(self.size[0]) / f64::from(self.size[1])
     }
 
-    /// Samples per pixel so far: a still's minimum; of frames those at rest, or their longest
-    /// history.
+    /// Samples per pixel so far: a still's minimum; of frames those at rest, or of a history.
     pub fn samples(&self) -> u32 {
         match &self.kind {
             Kind::Frames(view) => view.realtime.shown_samples(),
@@ -243,7 +242,7 @@ impl View {
     }
 
     /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each
-    /// pixel. After an interruption by `control` a still starts anew; frames have their histories
+    /// pixel. After an interruption a still starts anew, a frame does not
     /// ([`Realtime::frame_with`]).
     ///
     /// # Errors

@@ -1,5 +1,4 @@
-//! The camera of a scene that has none: chosen by what cameras inside and outside would see, or
-//! named.
+//! The camera of a scene that has none: chosen by what cameras would see, or named.
 
 use std::f64::consts::TAU;
 
@@ -280,8 +279,7 @@ fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
     Ok(true)
 }
 
-/// Whether the scene is one thing with thick walls: a mesh without open edges. Rooms are made of
-/// several, or their walls are sheets that face inwards.
+/// Whether the scene is one closed mesh. Rooms are made of several, or of sheets that face inwards.
 fn is_body(scene: &Scene) -> bool {
     let [instance] = &scene.instances[..] else { return false };
     match &scene.meshes[instance.mesh].geometry {

@@ -11,17 +11,15 @@ use crate::scene::{Camera, Material, light_spec};
 
 /// Radiance of the sky: neutral, so that colours are those of the surfaces.
 const SKY: &str = "0.5,0.5,0.5";
-/// The sun: from above, the left and before a scene that is seen from its front. Its disk is ten
-/// times as wide as the real one, for soft shadows. Together with the sky a white floor reflects a
-/// radiance of 0.9, just below white.
+/// The sun: from above, the left and before a scene seen from its front, ten times as wide as the
+/// real one, for soft shadows. Together with the sky a white floor reflects a radiance of 0.9.
 const SUN: &str = "sun direction=0.45,-1,-0.7 irradiance=1.65 angle=5";
 /// Median irradiance in view of a closed room over pi: the radiance of white diffuse surfaces.
 const LAMP: f64 = 0.5;
 /// Rays through the image, along its width and height, that find what is in view.
 const VIEW: [usize; 2] = [24, 16];
 
-/// Lights a scene that has no light, and names the light: a sky and a sun, or a lamp where the
-/// camera is in a closed room.
+/// Lights a scene without light, and names the light: sky and sun, or a lamp in a closed room.
 ///
 /// # Errors
 /// None.

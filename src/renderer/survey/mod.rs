@@ -1,5 +1,4 @@
-//! A survey of a scene before it is rendered: a few thousand rays choose the camera, the AO radius
-//! and the light that settings leave open.
+//! A survey of a scene: a few thousand rays choose the camera, the AO radius and the light.
 
 pub mod framing;
 pub mod light;

@@ -35,8 +35,7 @@ impl Openness {
     }
 }
 
-/// Measures how open the surfaces are that a camera sees; `None` if it sees none. `size` is the
-/// scene's.
+/// Measures how open the surfaces are that a camera sees, if any. `size`: of the scene.
 pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result<Option<Openness>> {
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];

@@ -4,8 +4,7 @@
 //! CPU driver reads such a value once for a vector of lanes before any branch that lanes may take
 //! differently; behind one (a thread beyond the last pixel has returned) it gathers the same word
 //! for each lane. So these reads move to the first block, each value once, where the address
-//! follows from push constants alone. GPUs have scalar registers for such values wherever they are
-//! read.
+//! follows from push constants alone. GPUs have scalar registers for such values.
 //!
 //! A read that moves may not have happened otherwise. Addresses in push constants are valid or
 //! null, and nothing is read through one that the shader compares. Only members that the shader
