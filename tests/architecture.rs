@@ -44,8 +44,28 @@ const MAX_CIRCLE: usize = 4;
 const MAX_MACROS: usize = 20;
 
 /// Rooms whose names, documentation and phases are held to `voice.rs`.
-const VOICED: &[&str] =
-    &["accel", "cli", "files", "gpu", "measure", "memory", "oracle", "sampling", "scene", "terminal", "tracer", "viewer"];
+const VOICED: &[&str] = &[
+    "accel",
+    "cli",
+    "denoise",
+    "files",
+    "film",
+    "gpu",
+    "interface",
+    "measure",
+    "memory",
+    "oracle",
+    "raster",
+    "realtime",
+    "renderer",
+    "sampling",
+    "scene",
+    "settings",
+    "shaders",
+    "terminal",
+    "tracer",
+    "viewer",
+];
 
 /// No folder holds this share of all lines.
 const MAX_SHARE: f64 = 0.15;
