@@ -6,18 +6,14 @@
 //! reflections; emitters and the background; and pixels that contain one of the latter two. Pixels
 //! with several surfaces are averaged among themselves only, so that no light leaks.
 
-use crate::shaders::{self, LANES};
-use std::time::Instant;
-
 use glam::Vec3;
 
 use super::DenoiseInput;
 use super::features::{Features, PinholeView, PixelContent, is_uniform_emitter};
 use crate::error::Result;
-use crate::film::Control;
-use crate::film::Film;
 use crate::film::block::Block;
 use crate::film::pace::Pace;
+use crate::film::{Control, Film};
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
@@ -25,7 +21,7 @@ use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
 use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
 use crate::scene::material::{Material, MaterialKind};
-
+use crate::shaders::{self, LANES};
 use crate::tracer::Push;
 
 /// Settings of the filter.
@@ -213,19 +209,11 @@ fn run(
             ..step.params()
         };
         let step = Buffer::from_slice(device, "filter parameters", &[step])?;
-        let mut first = 0;
-        while first < block.rays() {
-            let n = pace.rays().min(block.rays() - first);
+        pace.run_launches(block.rays(), control, |first, n| {
             let push = Push { pass: step.address(), first, count: first + n, ..Default::default() };
-            let start = Instant::now();
             let groups = n.div_ceil(FILTER_STRIP * LANES);
-            let timings = commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, groups)))?;
-            if n == pace.rays() {
-                pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
-            }
-            control.should_stop()?;
-            first += n;
-        }
+            commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, groups)))
+        })?;
         from = to;
     }
     Ok(bytemuck::pod_collect_to_vec(&from.read(0, from.size())?))

@@ -3,7 +3,6 @@
 //! with several surfaces; and it needs samples enough to tell likeness from noise.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::error::Result;
 use crate::film::pace::Pace;
@@ -69,18 +68,10 @@ fn run(device: &Arc<Device>, film: &Film, depths: &[f32], control: &mut dyn Cont
     let params = Buffer::from_slice(device, "parameters of non-local means", &[params])?;
     let pipeline = shader(channels).pipeline(device)?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
-    let (mut first, all) = (0, blocks(size, channels));
-    while first < all {
-        let n = pace.rays().min(all - first);
-        let push = Push { pass: params.address(), first, count: n, ..Default::default() };
-        let start = Instant::now();
-        let timings = commands.run(|r| r.timed("nlmeans", |r| r.dispatch(&pipeline, &push, n.div_ceil(LANES))))?;
-        if n == pace.rays() {
-            pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
-        }
-        control.should_stop()?;
-        first += n;
-    }
+    pace.run_launches(blocks(size, channels), control, |first, count| {
+        let push = Push { pass: params.address(), first, count, ..Default::default() };
+        commands.run(|r| r.timed("nlmeans", |r| r.dispatch(&pipeline, &push, count.div_ceil(LANES))))
+    })?;
     let values: Vec<f32> = bytemuck::pod_collect_to_vec(&to.read(0, to.size())?);
     Ok(values.chunks_exact(stride).flat_map(|v| &v[..film.channels]).copied().collect())
 }

@@ -1,5 +1,9 @@
 //! Adapts the size of launches to a twentieth of a second, so that drivers and users can interrupt.
 
+use std::time::Instant;
+
+use super::Control;
+use crate::error::Result;
 use crate::gpu::Timing;
 
 /// Target duration of a launch, seconds.
@@ -38,6 +42,31 @@ impl Pace {
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
         if self.rays < self.most { 2 } else { 4 }
+    }
+
+    /// Runs `count` threads or rays in launches, which `run` makes from their first and number, and
+    /// asks `control` between them whether to stop.
+    ///
+    /// # Errors
+    /// Those of `run` and `control`.
+    pub fn run_launches(
+        &mut self,
+        count: u32,
+        control: &mut dyn Control,
+        mut run: impl FnMut(u32, u32) -> Result<Vec<Timing>>,
+    ) -> Result<()> {
+        let mut first = 0;
+        while first < count {
+            let n = self.rays.min(count - first);
+            let start = Instant::now();
+            let timings = run(first, n)?;
+            if n == self.rays {
+                self.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
+            }
+            control.should_stop()?;
+            first += n;
+        }
+        Ok(())
     }
 
     /// Learns from the longest region of a submission whose launches had at most `rays` rays.

@@ -99,17 +99,10 @@ pub fn visit(
         }
 
         // Launch after launch, whose pixels are read back.
-        let mut first = 0;
-        while first < block.rays() {
-            let launch = pace.rays();
-            let count = launch.min(block.rays() - first);
-            let push =
-                Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
-            let start = std::time::Instant::now();
+        let (scene, pass) = (tracer.scene_address(), params_buffer.address());
+        pace.run_launches(block.rays(), control, |first, count| {
+            let push = Push { scene, pass, first, count, ..Default::default() };
             let timings = commands.run(|r| rays.record(r, &push))?;
-            if count == launch {
-                pace.learn(launch, &timings, start.elapsed().as_secs_f64(), 1);
-            }
             target.read_with(0, record * count as u64, record, |begin, bytes| {
                 for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {
                     if let Some(at) = block.image_index(first + begin as u32 + k as u32, size[0]) {
@@ -117,9 +110,8 @@ pub fn visit(
                     }
                 }
             })?;
-            control.should_stop()?;
-            first += count;
-        }
+            Ok(timings)
+        })?;
     }
     tracer.check_finished()
 }
@@ -128,10 +120,7 @@ pub fn visit(
 pub fn channels(wanted: &[Aov], pixels: &[AovPixel], origin: DVec3) -> Vec<Channel> {
     let wants = |aov: Aov| aov.is_in(wanted);
     let mut out = Vec::new();
-    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel {
-        name: name.into(),
-        samples: Samples::F32(pixels.iter().map(f).collect()),
-    };
+    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel::from_floats(name, pixels.iter().map(f).collect());
     let ids = |name: &str, f: &dyn Fn(&AovPixel) -> u32| Channel {
         name: name.into(),
         samples: Samples::U32(pixels.iter().map(f).collect()),

@@ -6,7 +6,7 @@ use super::brightness;
 use super::complete::{CHOSEN, Completed};
 use super::laps::{self, Laps};
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
-use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
+use super::still::{aov_needs, camera_text, spp_text};
 use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
@@ -20,7 +20,7 @@ use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::{PathOptions, PixelFilter};
 use crate::integrators::{IntegratorName, PictureOptions};
 use crate::output::png::Colour;
-use crate::output::{Channel, Image, Samples};
+use crate::output::{Channel, Image};
 use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
@@ -90,7 +90,7 @@ impl Renderer {
         laps.lap(laps::SURVEY);
         let realtime_settings = frame_settings(&settings)?;
         let scene = &self.scene;
-        let mut warnings = scene_warnings(scene);
+        let mut warnings = scene.report.all_warnings();
         warnings.iter().for_each(|w| control.warning(w));
 
         // The motion of camera and scene.
@@ -273,7 +273,6 @@ impl Frames<'_> {
     /// # Errors
     /// Those of the device.
     pub fn image(&self, control: &mut dyn Control) -> Result<Image> {
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
         let realtime = &self.realtime;
         let (coverage, samples) = (realtime.coverage()?, realtime.samples()?);
         let counts = || samples.iter().zip(&coverage).filter(|(_, c)| **c > 0.0).map(|(n, _)| n.ceil() as u32);
@@ -283,15 +282,15 @@ impl Frames<'_> {
             _ => self.report.settings.rays_per_pixel.to_string(),
         };
         let mut channels = colour_channels(realtime)?;
-        channels.extend([f32s("A", coverage), f32s("samples", samples)]);
+        channels.extend([Channel::from_floats("A", coverage), Channel::from_floats("samples", samples)]);
         if self.aov.iter().any(|a| *a != Aov::Bent) {
             let pixels = aov::render(&self.tracer, &self.camera_record(), self.size, control)?;
             channels.extend(aov::channels(&self.aov, &pixels, self.origin));
         }
         if Aov::Bent.is_in(&self.aov) {
             let bent = realtime.bent()?;
-            let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
-            channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
+            let axis = |(k, name): (usize, &str)| Channel::from_floats(name, bent.iter().map(|b| b[k]).collect());
+            channels.extend(["bent.X", "bent.Y", "bent.Z"].into_iter().enumerate().map(axis));
         }
         let number = self.report.frames.last().map_or(self.range.first, |f| f.number);
         let of_frame = [("camera", camera_text(&self.last_camera)), ("frame", number.to_string()), ("spp", spp)];
@@ -383,8 +382,8 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
 pub(super) fn colour_channels(realtime: &Realtime) -> Result<Vec<Channel>> {
     let (values, n) = (realtime.result()?, realtime.channels());
     let names: &[&str] = if n == 1 { &["Y"] } else { &["R", "G", "B"] };
-    let plane = |c: usize| Samples::F32(values.iter().skip(c).step_by(n).copied().collect());
-    Ok(names.iter().enumerate().map(|(c, name)| Channel { name: (*name).into(), samples: plane(c) }).collect())
+    let plane = |c: usize| values.iter().skip(c).step_by(n).copied().collect();
+    Ok(names.iter().enumerate().map(|(c, name)| Channel::from_floats(*name, plane(c))).collect())
 }
 
 /// Returns true if frames of the integrator are ambient occlusion, and not radiance.

@@ -22,7 +22,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
-use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
+use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
 use crate::tracer::{Needs, Tracer};
@@ -243,7 +243,7 @@ impl<'a> StillRender<'a> {
             rendered_by: [("tracer", renderer.kind.name().into()), ("device", format!("{} ({})", info.name, info.driver))],
             chosen: completed.options(),
             samples_before: None,
-            warnings: scene_warnings(scene),
+            warnings: scene.report.all_warnings(),
         }
     }
 
@@ -371,14 +371,6 @@ impl<'a> StillRender<'a> {
     }
 }
 
-/// Warnings of the scene's loader, a sentence each.
-pub(super) fn scene_warnings(scene: &crate::scene::Scene) -> Vec<String> {
-    let report = &scene.report;
-    let dropped =
-        (report.degenerate_triangles > 0).then(|| format!("dropped {} degenerate triangles", report.degenerate_triangles));
-    report.warnings.iter().cloned().chain(dropped).collect()
-}
-
 /// Description of a camera, for metadata.
 pub fn camera_text(camera: &Camera) -> String {
     let m = &camera.camera_to_world;
@@ -464,15 +456,15 @@ impl Composer<'_> {
     /// The film as named channels: means, coverage, the variance of a sample, and sums if kept.
     fn channels(&self, image: &Accumulated) -> Vec<Channel> {
         let (film, names) = (&image.film, self.render.integrator.channels());
-        let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
-        let mut out: Vec<_> = names.iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
-        out.push(f32s("A".into(), film.coverage.clone()));
+        let mean = |(c, name): (usize, &&str)| Channel::from_floats(*name, film.plane(c));
+        let mut out: Vec<_> = names.iter().enumerate().map(mean).collect();
+        out.push(Channel::from_floats("A", film.coverage.clone()));
         for (c, name) in names.iter().enumerate() {
-            let name = if names.len() == 1 { "variance".into() } else { format!("variance.{name}") };
-            out.push(f32s(name, film.variance_plane(c)));
+            let name = if names.len() == 1 { "variance".to_owned() } else { format!("variance.{name}") };
+            out.push(Channel::from_floats(name, film.variance_plane(c)));
         }
         // exact, as there are at most 2^24; frames in real time have fractions of samples
-        out.push(f32s("samples".into(), film.samples.iter().map(|n| *n as f32).collect()));
+        out.push(Channel::from_floats("samples", film.samples.iter().map(|n| *n as f32).collect()));
         out.extend(image.state.iter().flat_map(|s| film_file::state_channels(s, names)));
         out
     }

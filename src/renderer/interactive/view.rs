@@ -18,7 +18,7 @@ use crate::film::{Control, Film, SampleSettings};
 use crate::gpu::Timing;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::{Integrator, RenderJob};
-use crate::output::{self, Channel, FileSettings, Image, Picture, Samples, png};
+use crate::output::{self, Channel, FileSettings, Image, Picture, png};
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::renderer::frames::{
@@ -354,12 +354,12 @@ impl View {
     /// # Errors
     /// Those of the device and of `control`.
     pub fn image(&self, session: &Interactive, control: &mut dyn Control) -> Result<Image> {
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
         let mut image = match &self.kind {
             Kind::Frames(view) => {
                 let realtime = &view.realtime;
                 let mut channels = colour_channels(realtime)?;
-                channels.extend([f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)]);
+                channels.push(Channel::from_floats("A", realtime.coverage()?));
+                channels.push(Channel::from_floats("samples", realtime.samples()?));
                 Image { width: self.size[0], height: self.size[1], channels, metadata: Vec::new() }
             }
             Kind::Still(view) => view.image(self.size),
@@ -435,9 +435,9 @@ impl StillView {
 
     fn image(&self, size: [u32; 2]) -> Image {
         let names = self.integrator.channels();
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
-        let mut channels: Vec<_> = names.iter().enumerate().map(|(c, name)| f32s(name, self.film.plane(c))).collect();
-        channels.push(f32s("A", self.film.coverage.clone()));
+        let plane = |(c, name): (usize, &&str)| Channel::from_floats(*name, self.film.plane(c));
+        let mut channels: Vec<_> = names.iter().enumerate().map(plane).collect();
+        channels.push(Channel::from_floats("A", self.film.coverage.clone()));
         Image { width: size[0], height: size[1], channels, metadata: Vec::new() }
     }
 }
