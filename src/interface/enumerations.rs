@@ -12,7 +12,7 @@ pub(super) struct Declaration {
 
 impl Declaration {
     /// A choice, whose help texts say what the variants mean.
-    fn of_choice<T: Copy>(name: &'static str, all: &[T], variant: fn(T) -> (&'static str, u32, &'static str)) -> Self {
+    fn from_choice<T: Copy>(name: &'static str, all: &[T], variant: fn(T) -> (&'static str, u32, &'static str)) -> Self {
         Self { name, variants: all.iter().map(|&v| variant(v)).collect() }
     }
 }
@@ -21,11 +21,11 @@ impl Declaration {
 pub(super) fn declarations() -> Vec<Declaration> {
     let mut all = numbered();
     all.extend([
-        Declaration::of_choice("pixel_filter", &PixelFilter::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("sequence", &Sequence::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("pattern", &Resolution::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("tone_map", &ToneMap::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("shown", &DisplayMode::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("pixel_filter", &PixelFilter::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("sequence", &Sequence::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("pattern", &Resolution::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("tone_map", &ToneMap::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("shown", &DisplayMode::ALL, |v| (v.glsl_name(), v as u32, v.help())),
     ]);
     all
 }

@@ -39,7 +39,7 @@ pub struct FrameSamples {
 impl FrameSamples {
     /// Samples of radiance in images of so many pixels. `period` is left to the paths, whose frames
     /// at rest all sample the same pattern, and so have the same number.
-    pub fn of_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
+    pub fn for_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
         // a tenth of a frame's time is then for other things
         const FIRST_PER_PIXEL: u64 = 8;
         // a fortieth
@@ -66,7 +66,7 @@ impl FrameSamples {
     }
 
     /// Samples of ambient visibility; long frames take eight or more of a pixel, as stills do.
-    pub fn of_visibility(settings: &Settings, pixels: u64) -> Self {
+    pub fn for_visibility(settings: &Settings, pixels: u64) -> Self {
         // half a second on two cores, where that is enough for eight; in large images seconds
         const MAX_PER_PIXEL: u64 = 16;
         const MANY_SAMPLES: u64 = 1 << 22;
@@ -197,8 +197,8 @@ mod tests {
         for pixels in [1, 14_400, 518_400, 10_000_000] {
             for settings in [Preset::Fast, Preset::Quality].map(Preset::settings) {
                 let all = |settings: &Settings| {
-                    let of_radiance = [true, false].map(|is_cpu| FrameSamples::of_radiance(settings, pixels, is_cpu));
-                    of_radiance.into_iter().chain([FrameSamples::of_visibility(settings, pixels)])
+                    let for_radiance = [true, false].map(|is_cpu| FrameSamples::for_radiance(settings, pixels, is_cpu));
+                    for_radiance.into_iter().chain([FrameSamples::for_visibility(settings, pixels)])
                 };
                 let settings = Settings { converge: true, ..settings };
                 for samples in all(&settings) {
@@ -238,27 +238,27 @@ mod tests {
     #[test]
     fn frames_at_rest_become_longer() {
         let settings = Settings { converge: true, ..Preset::Balanced.settings() };
-        let samples = FrameSamples::of_radiance(&settings, 14_400, true);
+        let samples = FrameSamples::for_radiance(&settings, 14_400, true);
         assert_eq!(
             [0, 1, 2, 3, 4, 18, 19, 26, 27, 1000].map(|resting| samples.in_frame(resting)),
             [1, 2, 2, 4, 8, 8, 16, 16, 32, 32]
         );
         assert_eq!([samples.frames_for_first(10), samples.frames_for_first(64)], [12, 34]);
         let quality = Settings { converge: true, ..Preset::Quality.settings() };
-        let quality = FrameSamples::of_radiance(&quality, 14_400, true);
+        let quality = FrameSamples::for_radiance(&quality, 14_400, true);
         assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.in_frame(resting)), [4, 4, 4, 8, 8, 32]);
         // a GPU has time for several paths in a large image
-        let large = |is_cpu| FrameSamples::of_radiance(&settings, 1920 * 1080, is_cpu);
+        let large = |is_cpu| FrameSamples::for_radiance(&settings, 1920 * 1080, is_cpu);
         assert_eq!([large(true).in_frame(4), large(false).in_frame(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
         // all pixels of a pattern have the same number
-        let half = FrameSamples::of_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
+        let half = FrameSamples::for_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
         assert_eq!([3, 4, 100].map(|resting| half.in_frame(resting)), [1, 8, 8]);
     }
 
     #[test]
     fn long_frames_sample_all_pixels_of_a_pattern() {
         let half = Settings { converge: true, resolution: Resolution::Half, ..Preset::Fast.settings() };
-        let samples = FrameSamples::of_visibility(&half, 14_400);
+        let samples = FrameSamples::for_visibility(&half, 14_400);
         let short = samples.first_long - 1;
         assert_eq!(samples.since_rest(short + 2), u64::from(short / samples.period + 2 * samples.most()));
         for wanted in 1..100 {

@@ -151,12 +151,12 @@ impl Stage {
     }
 
     /// Has the stage run in long frames alone ([`super::frame_samples`]).
-    pub fn of_long_frames(self) -> Self {
+    pub fn in_long_frames(self) -> Self {
         Self { frames: Frames::Long, ..self }
     }
 
     /// Has the stage run in all frames but long ones.
-    pub fn of_short_frames(self) -> Self {
+    pub fn in_short_frames(self) -> Self {
         Self { frames: Frames::Short, ..self }
     }
 
@@ -379,7 +379,7 @@ fn record_range(
     if range == 0 {
         for (resource, word) in enabled().flat_map(|p| p.uses(display).clears) {
             if let Some(buffer) = resources.buffer(resource) {
-                hazards.before(r, &[], &[resources.buffer_index(resource)]);
+                hazards.separate(r, &[], &[resources.buffer_index(resource)]);
                 r.fill(buffer, buffer.size(), word);
             }
         }
@@ -389,7 +389,7 @@ fn record_range(
         let reads: Vec<_> = uses.reads.iter().map(|u| resources.buffer_index(*u)).collect();
         let previous: Vec<_> = uses.previous.iter().map(|u| resources.previous_index(*u)).collect();
         let writes: Vec<_> = uses.writes.iter().map(|u| resources.buffer_index(*u)).collect();
-        hazards.before(r, &[reads, previous].concat(), &writes);
+        hazards.separate(r, &[reads, previous].concat(), &writes);
         pass.record(r, frame, resources, stage.ranges[range])?;
     }
     Ok(())
@@ -404,7 +404,7 @@ struct Hazards {
 
 impl Hazards {
     /// Records a barrier if a use conflicts with those since the last one; then notes the use.
-    fn before(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
+    fn separate(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
         if self.conflicts(reads, writes) {
             r.barrier();
             *self = Self::default();

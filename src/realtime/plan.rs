@@ -79,7 +79,7 @@ pub trait Signal: Sync {
 
     /// Returns how many samples the frames of an image of so many pixels take.
     fn frame_samples(&self, settings: &Settings, pixels: u64, _is_cpu: bool) -> FrameSamples {
-        FrameSamples::of_visibility(settings, pixels)
+        FrameSamples::for_visibility(settings, pixels)
     }
 
     /// Checks that frames with these settings have the buffer.

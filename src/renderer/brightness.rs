@@ -11,7 +11,7 @@ const COVERED: f32 = 0.99;
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Mean of the pixels that show surfaces alone, luminance for colours; `None` without any.
-pub fn of_surfaces(image: &Accumulated, channels: usize) -> Option<f64> {
+pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
     let film = &image.film;
     let weights: &[f64] = if channels == 3 { &LUMINANCE } else { &[1.0] };
     let count = film.coverage.iter().filter(|a| **a >= COVERED).count();

@@ -131,7 +131,7 @@ impl Renderer {
                 Some(camera) => camera.clone(),
                 // the middle of a scene shows whether it is a closed room, without a hierarchy
                 None if survey.is_small() && survey.walls((lo + hi) * 0.5).is_some() => {
-                    framing::of_scene(&survey, ASPECT, None)?.camera()
+                    framing::choose_on_host(&survey, ASPECT, None)?.camera()
                 }
                 None => Camera::framing(lo, hi, ASPECT),
             };

@@ -135,7 +135,7 @@ impl CameraSettings {
         let is_automatic = self.eye.is_none() && self.camera.is_none() && survey.scene().cameras.is_empty();
         match self.view {
             Some(name) => framing::named(survey, name, aspect, fov_y).map(Some),
-            None if is_automatic => framing::of_scene(survey, aspect, fov_y).map(Some),
+            None if is_automatic => framing::choose_on_host(survey, aspect, fov_y).map(Some),
             None => Ok(None),
         }
     }

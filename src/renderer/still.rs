@@ -334,7 +334,7 @@ impl<'a> StillRender<'a> {
         let (integrator, job) = (self.integrator, &self.job);
 
         // warnings, of which those about brightness can be switched off
-        let surface_mean = brightness::of_surfaces(image, integrator.channels().len());
+        let surface_mean = brightness::surface_mean(image, integrator.channels().len());
         let exposure = f64::from(settings.picture.options().exposure);
         let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
         details.warnings.iter().for_each(|w| control.warning(w));

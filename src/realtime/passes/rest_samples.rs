@@ -38,7 +38,7 @@ pub fn stage(block: Block, spp: u32, launch_rays: u32) -> Stage {
     let ranges = Range::launches(block.rays() * spp, spp, launch_rays);
     let most = ranges.iter().map(|r| r.count).max().unwrap_or(0);
     let pass = RestSamples { traced: None, sample_bits: spp.ilog2(), most };
-    Stage::new(vec![Box::new(pass)], ranges).of_long_frames()
+    Stage::new(vec![Box::new(pass)], ranges).in_long_frames()
 }
 
 impl Traced {

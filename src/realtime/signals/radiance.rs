@@ -46,7 +46,7 @@ impl Radiance {
     ) -> Result<Pipeline> {
         let block = Block { origin: [0, 0], size };
         let pixels = pixels(size);
-        let frame_samples = FrameSamples::of_radiance(settings, pixels, tracer.device().info.is_cpu());
+        let frame_samples = FrameSamples::for_radiance(settings, pixels, tracer.device().info.is_cpu());
         let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
         let paths = SignalPaths::new(tracer, flat, options, most_paths(sampled, settings, frame_samples))?;
         let primary_reason = if paths.can_begin_at_known() {
@@ -114,7 +114,7 @@ impl Signal for Radiance {
     }
 
     fn frame_samples(&self, settings: &Settings, pixels: u64, is_cpu: bool) -> FrameSamples {
-        FrameSamples::of_radiance(settings, pixels, is_cpu)
+        FrameSamples::for_radiance(settings, pixels, is_cpu)
     }
 
     fn check_display(&self, mode: DisplayMode, settings: &Settings) -> Result<()> {

@@ -32,7 +32,7 @@ impl AmbientVisibility {
         let block = Block { origin: [0, 0], size };
         check_rays(block, settings)?;
         let (primary, primary_reason) = choose_primary(tracer, settings, size);
-        let frame_samples = FrameSamples::of_visibility(settings, pixels(size));
+        let frame_samples = FrameSamples::for_visibility(settings, pixels(size));
         Ok(Pipeline {
             signal: &Self,
             settings: Settings { primary: Some(primary), ..*settings },
@@ -108,7 +108,7 @@ fn stages(
     if has_rest {
         stages.push(rest::stage(tracer, pixels)?);
         if frame_samples.has_long() {
-            stages = stages.into_iter().map(Stage::of_short_frames).collect();
+            stages = stages.into_iter().map(Stage::in_short_frames).collect();
             stages.push(rest_samples::stage(block, frame_samples.most(), settings.launch_rays));
         }
         stages.extend(nlmeans::stages(tracer, block.size)?);

@@ -210,7 +210,7 @@ pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -
 ///
 /// # Errors
 /// [`Error::Scene`] for a scene without geometry.
-pub fn of_scene(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
+pub fn choose_on_host(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
     if survey.is_small() {
         return choose(survey.scene, aspect, fov_y, &|rays| survey.trace(rays));
     }
@@ -296,7 +296,7 @@ fn view_rays(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
 }
 
 /// The surfaces that the rays of views hit.
-fn seen(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
+fn trace_views(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
     let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(|c| view_rays(c, aspect)).collect();
     Ok(trace(&rays)?.chunks_exact(VIEW[0] * VIEW[1]).map(<[_]>::to_vec).collect())
 }
@@ -315,7 +315,7 @@ fn detail(rays: &[(DVec3, DVec3)], seen: &[Option<VisibleSurface>], size: f64) -
 }
 
 /// The camera with the highest score, and the score; of equal ones the first.
-fn best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Camera, f64)> {
+fn choose_best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Camera, f64)> {
     let best = scores.enumerate().reduce(|a, b| if b.1 > a.1 { b } else { a });
     best.and_then(|(k, score)| Some((cameras.into_iter().nth(k)?, score))).ok_or_else(no_geometry)
 }
@@ -350,8 +350,8 @@ fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Tra
         let sum = (1.0 - flaws) * shown * sum;
         if nearest < 0.02 { 0.2 * sum } else { sum }
     };
-    let scores: Vec<f64> = cameras.iter().zip(seen(&cameras, aspect, trace)?).map(score).collect();
-    best(cameras, scores.into_iter())
+    let scores: Vec<f64> = cameras.iter().zip(trace_views(&cameras, aspect, trace)?).map(score).collect();
+    choose_best(cameras, scores.into_iter())
 }
 
 /// The camera outside that shows most.
@@ -369,8 +369,9 @@ fn outside(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Res
         preference * (fronts - backs) / (fronts + backs).max(1.0) * (0.5 + variety)
     };
     let preferences = OUTSIDE.iter().map(|o| o.1);
-    let scores = seen(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
-    best(cameras, scores)
+    let scores =
+        trace_views(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
+    choose_best(cameras, scores)
 }
 
 /// Distances of what is seen from its front around a point, ascending.
@@ -468,7 +469,7 @@ mod tests {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
             let (lo, hi) = scene.bounds().unwrap();
-            let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera().camera_to_world.translation;
+            let eye = choose_on_host(&Survey::new(&scene), 1.5, None).unwrap().camera().camera_to_world.translation;
             assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
         }
     }
@@ -487,7 +488,7 @@ mod tests {
         mesh.normals.clear();
         mesh.texcoords.iter_mut().for_each(|t| t.clear());
         let (lo, hi) = scene.bounds().unwrap();
-        let eye = |scene: &Scene| of_scene(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
+        let eye = |scene: &Scene| choose_on_host(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
         let is_inside = |p: DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
         assert!(!is_inside(eye(&scene)));
         // as two meshes it is a room with thick walls
@@ -529,7 +530,7 @@ mod tests {
             if flip {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            let camera = of_scene(&Survey::new(&scene), 1.0, None).unwrap().camera();
+            let camera = choose_on_host(&Survey::new(&scene), 1.0, None).unwrap().camera();
             assert_eq!(camera.camera_to_world.translation.x < 0.0, left, "{camera:?}");
         }
     }
