@@ -1,4 +1,4 @@
-//! Adapts the size of launches to a twentieth of a second, so that drivers and users can interrupt.
+//! Adapts launches to a twentieth of a second: drivers reset devices that are busy, users cancel.
 
 use std::time::Instant;
 

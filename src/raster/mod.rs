@@ -131,10 +131,7 @@ impl Raster {
         })
     }
 
-    /// Records both [`Raster::draw`] and [`Raster::trace`].
-    ///
-    /// # Errors
-    /// Those of [`Raster::draw`].
+    /// Records both [`Raster::draw`], whose errors it has, and [`Raster::trace`].
     pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<DrawStats> {
         let stats = self.draw(recorder, tracer, view)?;
         self.trace(recorder, push);

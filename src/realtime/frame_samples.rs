@@ -7,7 +7,7 @@ use super::settings::Settings;
 /// frame's place in all pixels, so more of them leave edges jagged.
 const FIRST_LONG: u32 = 4;
 
-/// A long frame has at most this part of all samples at rest, so that the image changes visibly.
+/// A long frame has at most one in this many of all samples at rest: viewers see every change.
 const PARTS: u32 = 8;
 
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames

@@ -115,7 +115,7 @@ pub trait Signal: Sync {
         1
     }
 
-    /// Returns true if the first frame of an image is one at rest, with offsets of each path.
+    /// Returns true if the first frame of an image is one at rest: there are no histories yet.
     fn begins_at_rest(&self, _samples: &FrameSamples) -> bool {
         false
     }

@@ -95,7 +95,8 @@ pub struct Resolved {
 /// which prevails. `confine` says where the latter, and files that it names, must lie.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`], and [`Error::Input`] if a scene's folder may not choose that.
+/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may
+/// not choose, and for a file that lies elsewhere.
 pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);

@@ -115,10 +115,7 @@ impl Renderer {
         Self::open_with(scene, &LoadOptions::default(), settings)
     }
 
-    /// As [`Renderer::open`], with options of loading.
-    ///
-    /// # Errors
-    /// As [`Renderer::open`].
+    /// As [`Renderer::open`], errors included, with options of loading.
     pub fn open_with(scene: &str, options: &LoadOptions, settings: &DeviceSettings) -> Result<Self> {
         let timed = |start: Instant| start.elapsed().as_secs_f64();
         let open = Instant::now();

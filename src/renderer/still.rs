@@ -53,15 +53,12 @@ pub struct Still {
 }
 
 impl Still {
-    /// Writes the image in the format of the file name's extension.
-    ///
-    /// # Errors
-    /// Those of [`Still::save_with`].
+    /// As [`Still::save_with`], errors included, with default settings of the file.
     pub fn save(&self, path: &Path) -> Result<()> {
         self.save_with(path, &FileSettings::default())
     }
 
-    /// As [`Still::save`], with settings of the file; those of other formats are ignored.
+    /// Writes the image in the format of the extension; settings of other formats are ignored.
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown format, or settings that it lacks; [`Error::Output`].
@@ -81,10 +78,7 @@ pub struct IntermediateImage<'a> {
 }
 
 impl IntermediateImage<'_> {
-    /// Writes the image as [`Still::save_with`] does.
-    ///
-    /// # Errors
-    /// Those of [`Still::save_with`].
+    /// Writes the image as [`Still::save_with`] does, errors included.
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
         save(self.image, self.integrator, &self.picture, files, path)
     }
@@ -117,11 +111,8 @@ impl Renderer {
         self.still_with(settings, StillExtras::default(), control, &mut |_| Ok(()))
     }
 
-    /// As [`Renderer::still`]; `save` receives intermediate images, at the numbers of samples that
-    /// [`super::settings::FilmSettings::intervals`] selects.
-    ///
-    /// # Errors
-    /// As [`Renderer::still`], and those of `save`.
+    /// As [`Renderer::still`]; `save`, whose errors are returned, receives intermediate images, at
+    /// the numbers of samples that [`super::settings::FilmSettings::intervals`] selects.
     pub fn still_with(
         &mut self,
         settings: &RenderSettings,

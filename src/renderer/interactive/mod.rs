@@ -167,10 +167,7 @@ impl<'r> Interactive<'r> {
         }
     }
 
-    /// The camera that is chosen by what it would see ([`framing::choose`]), in any scene.
-    ///
-    /// # Errors
-    /// As [`Self::choose_camera`].
+    /// As [`Self::choose_camera`], errors included, but whatever cameras the file has.
     pub fn automatic_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;

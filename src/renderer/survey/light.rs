@@ -20,9 +20,6 @@ const LAMP: f64 = 0.5;
 const VIEW: [usize; 2] = [24, 16];
 
 /// Lights a scene without light, and names the light: sky and sun, or a lamp in a closed room.
-///
-/// # Errors
-/// None.
 pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(LightingSettings, String)> {
     let eye = camera.camera_to_world.translation;
     let parse = |text: &str| light_spec::parse(text).map_err(Error::Usage);

@@ -71,10 +71,7 @@ impl<'s> Survey<'s> {
         self.scene.triangle_count() + self.scene.sphere_count() <= MAX_PRIMITIVES
     }
 
-    /// Finds the surfaces that rays hit.
-    ///
-    /// # Errors
-    /// None.
+    /// Finds the surfaces that rays hit, without any error.
     pub fn trace(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
         let origin = self.scene.origin();
         let oracle = self.oracle.get_or_init(|| Oracle::new(self.scene, origin));
