@@ -18,12 +18,7 @@ impl DisplayMode {
     /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
-            DisplayMode::Result
-            | DisplayMode::Unfiltered
-            | DisplayMode::Samples
-            | DisplayMode::Variance
-            | DisplayMode::Depth
-            | DisplayMode::Rays => Colour::Grey,
+            Self::Result | Self::Unfiltered | Self::Samples | Self::Variance | Self::Depth | Self::Rays => Colour::Grey,
             _ => Colour::Rgb,
         }
     }
