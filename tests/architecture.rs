@@ -45,8 +45,32 @@ const MAX_MACROS: usize = 20;
 
 /// Rooms whose names, documentation and phases are held to `voice.rs`.
 const VOICED: &[&str] = &[
-    "accel", "bench", "cli", "compare", "files", "gpu", "measure", "memory", "oracle", "output", "report", "sampling", "scene",
-    "stress", "terminal", "tracer", "verify", "viewer",
+    "accel",
+    "bench",
+    "cli",
+    "compare",
+    "denoise",
+    "files",
+    "film",
+    "gpu",
+    "interface",
+    "measure",
+    "memory",
+    "oracle",
+    "output",
+    "raster",
+    "realtime",
+    "renderer",
+    "report",
+    "sampling",
+    "scene",
+    "settings",
+    "shaders",
+    "stress",
+    "terminal",
+    "tracer",
+    "verify",
+    "viewer",
 ];
 
 /// No folder holds this share of all lines.

@@ -16,7 +16,6 @@ use crate::scene::Scene;
 use crate::terminal::console::{Console, Failure, one_line};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
-use crate::terminal::warnings::warnings_of;
 
 /// Steps of the progress bar for one job.
 const STEPS: u64 = 1000;
@@ -129,7 +128,7 @@ impl<'a, A> Session<'a, A> {
 
     /// Notes what loading a scene warned of.
     pub fn note_warnings(&mut self, source: &str, scene: &Scene) {
-        for warning in warnings_of(scene) {
+        for warning in scene.report.all_warnings() {
             self.note(format!("{source}: {}", one_line(&warning)));
         }
     }

@@ -8,7 +8,7 @@ use crate::files;
 use crate::files::plan::FilePlan;
 use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
-use crate::terminal::warnings::{Warnings, warnings_of};
+use crate::terminal::warnings::Warnings;
 
 /// Checks the files that are written beside a `.gltf`: they replace no file of the scene and,
 /// without `--force`, none that no earlier export to the same name has written.
@@ -53,7 +53,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     args.meaning.apply(&mut scene);
     check_companions(args, plan, &scene, output)?;
     let mut warnings = Warnings::new(console);
-    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
+    scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
     let written = write(&scene, output)?;
     written.warnings.iter().for_each(|w| warnings.add(w));
     console.line(&format!("{}: {} triangles of {}", output.display(), written.triangles, scene.name))?;

@@ -17,7 +17,7 @@ use crate::settings::Length;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
 use crate::terminal::progress::Progress;
-use crate::terminal::warnings::{Warnings, warnings_of};
+use crate::terminal::warnings::Warnings;
 use crate::tracer::DeviceSettings;
 
 /// Frames by which the time of a frame is estimated, and their size.
@@ -96,7 +96,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let mut scene = load::load_with(&args.scene, &args.load.options())?;
     args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
-    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
+    scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
     let inventory = Inventory::from_scene(&scene);
     let format = format_of(&args.scene);
     let extensions = scene.report.extensions.clone();

@@ -16,7 +16,7 @@ use crate::ray::{Ray, translate};
 use crate::scene::{Scene, export, load};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
-use crate::terminal::warnings::{Warnings, warnings_of};
+use crate::terminal::warnings::Warnings;
 use crate::tracer::{Needs, Tracer};
 
 /// Loads, traces, and reports.
@@ -41,7 +41,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let scene = read_mesh(args)?;
     plan.check_scene(&scene.report.files)?;
     let mut warnings = Warnings::new(console);
-    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
+    scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
     translate(&mut set, -flat.origin);
 

@@ -1,5 +1,4 @@
-//! Auxiliary feature images for denoising: AOVs of each pixel's centre, and of a grid of points in it, which show whether a pixel
-//! contains several surfaces.
+//! Feature images for denoising: AOVs of each pixel's centre, and of a grid of points in it.
 
 use glam::Vec3;
 
@@ -33,10 +32,10 @@ pub enum PixelContent {
 /// Feature images, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Features {
-    /// Linear base colour, averaged over the pixel, channels interleaved. Mirrors and glass have their specular or transmitted colour, all
-    /// surfaces have 1 in white-furnace mode, and the background has 0.
+    /// Linear base colour, averaged over the pixel, channels interleaved. Mirrors and glass have
+    /// their specular or transmitted colour, white furnaces 1, the background 0.
     pub albedo: Vec<f32>,
-    /// World-space shading normal without normal maps, averaged over the pixel, channels interleaved. Shorter than 1 where normals differ.
+    /// World-space normal without normal maps, averaged over the pixel, channels interleaved.
     pub normals: Vec<f32>,
     /// Fraction of the pixel that is covered by surfaces, in [0, 1].
     pub coverage: Vec<f32>,
@@ -91,14 +90,18 @@ impl Features {
         let DenoiseInput { tracer, scene, camera, options } = *shot;
         let [width, height] = options.samples.size;
         let pixels = width as usize * height as usize;
+
+        // AOVs of the pixels' centres, with which all other points are compared.
         let centres = aov::render(tracer, camera, options.samples.size, control)?;
         let mut albedo = vec![Vec3::ZERO; pixels];
         let mut normals = vec![Vec3::ZERO; pixels];
         let mut coverage = vec![0.0; pixels];
         let mut content = vec![PixelContent::OneSurface; pixels];
-        let look = PinholeView::new(camera, height);
+        let view = PinholeView::new(camera, height);
         let reach = reach(options.samples.pixel_filter);
         let share = 1.0 / (GRID * GRID) as f32;
+
+        // Means over a grid of points of each pixel.
         let fine = [width * GRID, height * GRID];
         aov::visit(tracer, camera, fine, Primary::Traced, control, &mut |index, point| {
             let [x, y] = [index % fine[0] as usize, index / fine[0] as usize];
@@ -109,8 +112,9 @@ impl Features {
                 normals[at] += Vec3::from(point.ns) * share;
                 coverage[at] += share;
             }
-            let source = material.is_none_or(|m| options.white_sky.is_none() && is_uniform_emitter(m));
-            // every pixel whose reconstruction filter may include this point
+
+            // The content of every pixel whose reconstruction filter may include this point.
+            let is_emitter = material.is_none_or(|m| options.white_sky.is_none() && is_uniform_emitter(m));
             let range = |p: usize, n: u32| {
                 let grid = GRID as usize;
                 (p.saturating_sub(reach) / grid)..=((p + reach) / grid).min(n as usize - 1)
@@ -119,10 +123,13 @@ impl Features {
                 for column in range(x, width) {
                     let k = row * width as usize + column;
                     let centre = &centres[k];
-                    let found = match centre.depth < f32::INFINITY && material.is_some() && look.is_same(centre, point) {
-                        true => PixelContent::OneSurface,
-                        false if source => PixelContent::Emitter,
-                        false => PixelContent::SeveralSurfaces,
+                    let are_surfaces = centre.depth < f32::INFINITY && material.is_some();
+                    let found = if are_surfaces && view.is_same(centre, point) {
+                        PixelContent::OneSurface
+                    } else if is_emitter {
+                        PixelContent::Emitter
+                    } else {
+                        PixelContent::SeveralSurfaces
                     };
                     content[k] = content[k].max(found);
                 }
@@ -133,8 +140,7 @@ impl Features {
     }
 }
 
-/// Number of grid points beyond a pixel's border that may be visible in it: the filter's reach, and one more, because what lies between two
-/// points may belong to either.
+/// Number of grid points beyond a border that may be visible: the filter's reach, and one between.
 fn reach(filter: PixelFilter) -> usize {
     let beyond = match filter {
         PixelFilter::Box | PixelFilter::Centre => 0.0,
@@ -151,7 +157,7 @@ pub(super) fn is_uniform_emitter(material: &Material) -> bool {
 
 fn colour(material: &Material, point: &AovPixel, options: &PathOptions) -> Vec3 {
     match material.kind {
-        // in white-furnace mode there are no materials, and radiance is divided by the constant albedo already
+        // white furnaces have no materials, and radiance is divided by their albedo already
         _ if options.white_sky.is_some() => Vec3::ONE,
         MaterialKind::Mirror => material.specular_color,
         MaterialKind::Glass => material.specular_color.max(material.transmittance),

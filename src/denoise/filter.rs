@@ -1,22 +1,19 @@
-//! The spatial filter of the real-time renderer (shaders/common/filter.glsl) applied to radiance: radiance is divided by albedo, averaged over
-//! neighbours on the same surface as far as noise explains their differences, and multiplied by albedo again.
+//! The spatial filter of the real-time renderer (shaders/common/filter.glsl) applied to radiance:
+//! it is divided by albedo, averaged over neighbours on the same surface as far as noise explains
+//! their differences, and multiplied by albedo again.
 //!
-//! Some pixels are not filtered: those of mirrors, glass and polished metal, because the features do not show the edges in reflections;
-//! those of emitters and the background; and those that contain one of the latter two. Pixels with several surfaces are averaged among themselves
-//! only, so that their light does not leak onto adjacent surfaces.
-
-use crate::shaders::{self, LANES};
-use std::time::Instant;
+//! Left alone are mirrors, glass and polished metal, because the features do not show the edges in
+//! reflections; emitters and the background; and pixels that contain one of the latter two. Pixels
+//! with several surfaces are averaged among themselves only, so that no light leaks.
 
 use glam::Vec3;
 
 use super::DenoiseInput;
 use super::features::{Features, PinholeView, PixelContent, is_uniform_emitter};
 use crate::error::Result;
-use crate::film::Control;
-use crate::film::Film;
 use crate::film::block::Block;
 use crate::film::pace::Pace;
+use crate::film::{Control, Film};
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
@@ -24,7 +21,7 @@ use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
 use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
 use crate::scene::material::{Material, MaterialKind};
-
+use crate::shaders::{self, LANES};
 use crate::tracer::Push;
 
 /// Settings of the filter.
@@ -44,7 +41,7 @@ impl Default for Settings {
     }
 }
 
-/// Minimum albedo by which radiance is divided: darker surfaces carry no information about irradiance.
+/// Minimum albedo by which radiance is divided: darker surfaces tell nothing about irradiance.
 const MIN_ALBEDO: f32 = 0.01;
 /// Roughness below which metals count as mirrors.
 const POLISHED: f32 = 0.25;
@@ -61,7 +58,7 @@ struct Guided {
 pub struct Filtered {
     /// Means, channels interleaved, rows from the top.
     pub means: Vec<f32>,
-    /// Depth of each pixel's surface, scene units; negative where it shows several, 0 where it is left alone.
+    /// Depth of each pixel's surface, scene units: negative for several surfaces, 0 if left alone.
     pub depths: Vec<f32>,
 }
 
@@ -90,7 +87,7 @@ fn rgb(image: &[f32], pixel: usize) -> Vec3 {
     Vec3::from_slice(&image[3 * pixel..][..3])
 }
 
-/// Whether the material shows sharp reflections or refractions, whose edges the features do not contain.
+/// Whether the material shows sharp reflections or refractions: features lack their edges.
 fn has_sharp_reflections(material: &Material) -> bool {
     let polished = material.roughness < POLISHED;
     match material.kind {
@@ -118,8 +115,9 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
         estimates: vec![RadianceRecord::default(); pixels],
         divisors: vec![Vec3::ZERO; pixels],
     };
-    let look = PinholeView::new(camera, film.height);
+    let view = PinholeView::new(camera, film.height);
     let white = options.white_sky.is_some();
+
     for k in 0..pixels {
         let (centre, samples, content) = (&features.centres[k], film.samples[k], features.content[k]);
         let Some(material) = scene.materials.get(centre.material as usize).filter(|_| centre.depth < f32::INFINITY) else {
@@ -127,11 +125,12 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
         };
         let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
         let reflects = if white { albedo } else { albedo + specular_albedo(material) };
-        let is_skipped =
-            !white && (has_sharp_reflections(material) || is_uniform_emitter(material) || reflects.max_element() <= MIN_ALBEDO);
+        let is_black = reflects.max_element() <= MIN_ALBEDO;
+        let is_skipped = !white && (has_sharp_reflections(material) || is_uniform_emitter(material) || is_black);
         if samples == 0 || content == PixelContent::Emitter || is_skipped {
             continue;
         }
+
         // depth of field blurs radiance but not the albedo, which comes from a pinhole
         let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(MIN_ALBEDO)) };
         // the shader wants the mean square about the pixel's own mean
@@ -142,12 +141,13 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
             variance: variance.to_array(),
             narrowed: 0.0,
         };
+
+        // eight bits: seven of a hash of the material, and one that is set for several surfaces
+        let is_several = u32::from(content == PixelContent::SeveralSurfaces);
+        let class = (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | is_several;
         let [x, y, z] = centre.ng;
         out.normals[k] = [x, y, z, 0.0];
-        // eight bits: seven of a hash of the material, and one that is set for several surfaces
-        let class =
-            (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(content == PixelContent::SeveralSurfaces);
-        out.guides[k] = [look.depth(centre.position).to_bits(), pack_normal(Vec3::from(centre.ns)) | class << 24];
+        out.guides[k] = [view.depth(centre.position).to_bits(), pack_normal(Vec3::from(centre.ns)) | class << 24];
         out.divisors[k] = divisor;
     }
     out
@@ -169,6 +169,8 @@ fn run(
 ) -> Result<Vec<RadianceRecord>> {
     let (device, camera) = (shot.tracer.device(), shot.camera);
     let block = Block { origin: [0, 0], size };
+
+    // Buffers and the parameters that all steps share.
     let normals = Buffer::from_slice(device, "normals", &guided.normals)?;
     let guide = Buffer::from_slice(device, "guide", &guided.guides)?;
     let given = Buffer::from_slice(device, "radiance", &guided.estimates)?;
@@ -192,6 +194,8 @@ fn run(
         ..Default::default()
     };
     let params = Buffer::from_slice(device, "frame parameters", &[params])?;
+
+    // Each step reads the image of the one before.
     let pipeline = shaders::DENOISE.specialized(device, &filter.specialization())?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
     let mut from = &given;
@@ -205,19 +209,11 @@ fn run(
             ..step.params()
         };
         let step = Buffer::from_slice(device, "filter parameters", &[step])?;
-        let mut first = 0;
-        while first < block.rays() {
-            let n = pace.rays().min(block.rays() - first);
+        pace.run_launches(block.rays(), control, |first, n| {
             let push = Push { pass: step.address(), first, count: first + n, ..Default::default() };
-            let start = Instant::now();
-            let timings =
-                commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, n.div_ceil(FILTER_STRIP * LANES))))?;
-            if n == pace.rays() {
-                pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
-            }
-            control.should_stop()?;
-            first += n;
-        }
+            let groups = n.div_ceil(FILTER_STRIP * LANES);
+            commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, groups)))
+        })?;
         from = to;
     }
     Ok(bytemuck::pod_collect_to_vec(&from.read(0, from.size())?))
@@ -235,10 +231,12 @@ mod tests {
 
     #[test]
     fn what_shows_others_is_left_alone() {
-        let of =
+        let is_sharp =
             |kind, roughness, metallic| has_sharp_reflections(&Material { kind, roughness, metallic, ..Material::default() });
-        assert!(of(MaterialKind::Mirror, 1.0, 0.0) && of(MaterialKind::Glass, 1.0, 0.0));
-        assert!(of(MaterialKind::Gold, 0.1, 0.0) && !of(MaterialKind::Gold, 0.5, 0.0) && !of(MaterialKind::Matte, 0.0, 1.0));
-        assert!(of(MaterialKind::MetallicRoughness, 0.1, 1.0) && !of(MaterialKind::MetallicRoughness, 0.1, 0.0));
+        assert!(is_sharp(MaterialKind::Mirror, 1.0, 0.0) && is_sharp(MaterialKind::Glass, 1.0, 0.0));
+        assert!(is_sharp(MaterialKind::Gold, 0.1, 0.0) && !is_sharp(MaterialKind::Gold, 0.5, 0.0));
+        assert!(!is_sharp(MaterialKind::Matte, 0.0, 1.0));
+        assert!(is_sharp(MaterialKind::MetallicRoughness, 0.1, 1.0));
+        assert!(!is_sharp(MaterialKind::MetallicRoughness, 0.1, 0.0));
     }
 }

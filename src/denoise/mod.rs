@@ -1,5 +1,6 @@
-//! Denoising of films (biased): `filter` applies the spatial filter of the real-time renderer to radiance or ambient visibility, on the tracer's
-//! device; [`Oidn`] is Intel's Open Image Denoise. Both are guided by the feature images of [`Features`].
+//! Denoising of films (biased): `filter` applies the spatial filter of the real-time renderer to
+//! radiance or ambient visibility, on the tracer's device; [`Oidn`] is Intel's Open Image Denoise.
+//! Both are guided by the feature images of [`Features`].
 
 mod features;
 mod filter;
@@ -39,7 +40,7 @@ pub struct DenoiseInput<'a> {
     pub scene: &'a Scene,
     /// The film's camera.
     pub camera: &'a CameraRecord,
-    /// The options of the path integrator; of ambient occlusion those of a white sky, whose surfaces have no materials either.
+    /// The options of the path integrator; ambient occlusion has those of a white sky.
     pub options: &'a PathOptions,
 }
 
@@ -60,11 +61,11 @@ impl Denoiser {
         }
     }
 
-    /// The denoised means of the film: linear radiance or ambient visibility, its channels interleaved, rows from the top. `features` must be rendered from
-    /// the same input.
+    /// Denoises the means of the film: linear radiance or ambient visibility, channels interleaved,
+    /// rows from the top. `features` must be rendered from the same input.
     ///
     /// # Errors
-    /// Those of the device, [`crate::Error::Interrupted`] when `control` says so, and those of the library.
+    /// Those of the device or the library; [`crate::Error::Interrupted`] when `control` says so.
     pub fn denoise(
         &self,
         shot: &DenoiseInput,

@@ -1,8 +1,8 @@
-//! Non-local means (shaders/common/nlmeans.glsl): the mean over pixels around that look alike, as far as noise explains how they differ. It needs no plane, so it also averages detail and pixels
-//! that show several surfaces; and it needs samples enough to tell likeness from noise.
+//! Non-local means (shaders/common/nlmeans.glsl): the mean over pixels around that look alike, as
+//! far as noise explains how they differ. It needs no plane, so it also averages detail and pixels
+//! with several surfaces; and it needs samples enough to tell likeness from noise.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::error::Result;
 use crate::film::pace::Pace;
@@ -12,11 +12,11 @@ use crate::realtime::nlmeans::{EVENNESS, blocks, params, shader};
 use crate::shaders::LANES;
 use crate::tracer::Push;
 
-/// Samples of a pixel from which non-local means count at least as much as the filter that is guided by surfaces, of which few samples need more.
+/// Samples of a pixel from which non-local means count at least as much as the guided filter.
 const EVEN_SAMPLES: f32 = 16.0;
 
-/// Mixes the film's means, filtered by non-local means, into `filtered`, the same after the filter that is guided by surfaces: the more the more samples a pixel has. `depths` says
-/// which pixels are averaged (`NlMeansParams`).
+/// Mixes the film's means, filtered by non-local means, into those that surfaces guided: the more
+/// the more samples a pixel has. `depths` says which pixels are averaged (`NlMeansParams`).
 ///
 /// # Errors
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
@@ -39,16 +39,17 @@ pub fn refine(
     Ok(())
 }
 
-/// Of each pixel its value and the variance of that, which is summed over channels and averaged over 3x3 pixels, because few samples know their own badly.
+/// Each pixel's value and its variance, averaged over 3x3 pixels: few samples know it badly.
 fn estimates(film: &Film) -> Vec<f32> {
     let [width, height] = [film.width as usize, film.height as usize];
     let errors: Vec<f32> = (film.samples.iter().zip(film.variance.chunks_exact(film.channels)))
         .map(|(&n, variance)| variance.iter().sum::<f32>() * (n.max(1) as f32).powf(-1.0 - EVENNESS))
         .collect();
-    let around = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
+    let neighbours = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
     let mut out = Vec::with_capacity((film.channels + 1) * errors.len());
     for (k, mean) in film.mean.chunks_exact(film.channels).enumerate() {
-        let taps = || around(k / width, height).flat_map(|y| around(k % width, width).map(move |x| y * width + x));
+        let row = |y: usize| neighbours(k % width, width).map(move |x| y * width + x);
+        let taps = || neighbours(k / width, height).flat_map(row);
         out.extend(mean);
         out.push(taps().map(|tap| errors[tap]).sum::<f32>() / taps().count() as f32);
     }
@@ -67,18 +68,10 @@ fn run(device: &Arc<Device>, film: &Film, depths: &[f32], control: &mut dyn Cont
     let params = Buffer::from_slice(device, "parameters of non-local means", &[params])?;
     let pipeline = shader(channels).pipeline(device)?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
-    let (mut first, all) = (0, blocks(size, channels));
-    while first < all {
-        let n = pace.rays().min(all - first);
-        let push = Push { pass: params.address(), first, count: n, ..Default::default() };
-        let start = Instant::now();
-        let timings = commands.run(|r| r.timed("nlmeans", |r| r.dispatch(&pipeline, &push, n.div_ceil(LANES))))?;
-        if n == pace.rays() {
-            pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
-        }
-        control.should_stop()?;
-        first += n;
-    }
+    pace.run_launches(blocks(size, channels), control, |first, count| {
+        let push = Push { pass: params.address(), first, count, ..Default::default() };
+        commands.run(|r| r.timed("nlmeans", |r| r.dispatch(&pipeline, &push, count.div_ceil(LANES))))
+    })?;
     let values: Vec<f32> = bytemuck::pod_collect_to_vec(&to.read(0, to.size())?);
     Ok(values.chunks_exact(stride).flat_map(|v| &v[..film.channels]).copied().collect())
 }

@@ -1,6 +1,5 @@
-//! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), and within a step block by block, batch by batch and
-//! launch by launch. Reports progress, respects a time limit, and can be stopped so that every pixel has complete samples. An
-//! `Estimator` evaluates the samples.
+//! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), block by
+//! block, batch by batch and launch by launch. A stop leaves every pixel with complete samples.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,7 +19,7 @@ use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Tracer};
 
-/// Log2 of the maximum number of samples per pixel in a launch, unless an estimator takes more. Samples of a pixel are neighbouring rays, which are coherent.
+/// Log2 of the maximum number of samples per pixel in a launch, which are coherent, by default.
 pub(crate) const MAX_SAMPLE_BITS: u32 = 4;
 
 /// Evaluates samples of pixels on the device: the device side of an integrator.
@@ -30,16 +29,16 @@ pub(crate) trait Estimator {
     /// Log2 of the maximum number of samples per pixel in a launch.
     const SAMPLE_BITS: u32 = MAX_SAMPLE_BITS;
 
-    /// Must the rays of the first sample of each pixel be kept? Then that sample is a batch of its own.
+    /// Must the rays of the first sample of each pixel be kept? Then it is a batch of its own.
     fn keeps_first(&self) -> bool {
         false
     }
 
-    /// Prepares the launches of a batch and returns the device address of the pass's parameters. `keep`: the batch is the first sample and
-    /// [`Estimator::keeps_first`] is true.
+    /// Prepares the launches of a batch and returns the device address of the pass's parameters.
+    /// `keep`: the batch is the first sample and [`Estimator::keeps_first`] is true.
     fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64>;
 
-    /// Runs launches in order and adds their results to the film that the parameters address. With `keep` there is exactly one launch.
+    /// Runs launches in order, which add to the film of the parameters; with `keep` it is one.
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>>;
 }
 
@@ -48,7 +47,7 @@ pub(crate) trait Estimator {
 pub struct Accumulated {
     /// The image.
     pub film: Film,
-    /// Its exact sums, if [`super::schedule::FilmOptions::keep_state`] is set.
+    /// Exact sums, if [`super::schedule::FilmOptions::keep_state`] is set.
     pub state: Option<FilmState>,
     /// Minimum samples per pixel.
     pub spp: u32,
@@ -72,7 +71,7 @@ pub struct Accumulated {
     pub trace_seconds: f64,
 }
 
-/// Maximum number of rays in a launch, the capacity that an estimator's buffers need, where the device's is `most`. `sample_bits`: [`Estimator::SAMPLE_BITS`].
+/// Maximum number of rays in a launch: the capacity of an estimator. `most` is the device's.
 pub(crate) fn max_rays(most: u32, size: [u32; 2], spp: u32, sample_bits: u32) -> u32 {
     let max_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
     let bits = spp.max(1).ilog2().min(sample_bits);
@@ -111,8 +110,9 @@ struct Batch {
 }
 
 impl Batch {
-    /// The largest batch that fits a launch of `sample_bits`, the samples left of `wanted`, and `most` (at least one). One of more than 2^[`MAX_SAMPLE_BITS`] is no larger than
-    /// all before it together, so that whoever stops a render loses at most half of it with the batch in progress.
+    /// The largest batch that fits a launch of `sample_bits`, the samples left of `wanted`, and
+    /// `most` (at least one). Above 2^[`MAX_SAMPLE_BITS`] it is no larger than all before it
+    /// together, so that a stop loses at most half of a render with the batch in progress.
     fn next(first: u32, wanted: u32, most: u32, sample_bits: u32) -> Self {
         let samples = (wanted - first).min(most.max(1));
         let before = first.checked_ilog2().unwrap_or(0).max(MAX_SAMPLE_BITS);
@@ -127,8 +127,9 @@ impl Batch {
 /// Accumulates the samples of an image. `params`: the estimator's own block parameters; what
 /// follows from camera, samples and film is filled in.
 ///
-/// When `control` requests a stop, only complete samples are kept, so that all pixels of a tile have the same count. The batch in
-/// progress is abandoned for that, unless the pixels have no sample yet.
+/// When `control` requests a stop, only complete samples are kept, so that all pixels of a tile
+/// have the same count. The batch in progress is abandoned for that, unless the pixels have no
+/// sample yet.
 ///
 /// # Errors
 /// Those of the device and of `control`, usually [`crate::Error::Interrupted`].
@@ -142,6 +143,8 @@ pub(crate) fn accumulate<E: Estimator>(
 ) -> Result<Accumulated> {
     let (start, options) = (Instant::now(), &samples.film);
     let [tiles_x, tiles_y] = tiles(samples.size);
+
+    // Begin with an empty film, or with the one to resume.
     let mut out = Accumulated { film: Film::new(samples.size[0], samples.size[1], E::CHANNELS), ..Default::default() };
     let mut tile_samples = vec![0; tiles_x * tiles_y];
     if options.needs_state() {
@@ -150,7 +153,8 @@ pub(crate) fn accumulate<E: Estimator>(
             Some(s) if s.size() == samples.size && s.channels() == E::CHANNELS => s.clone(),
             Some(s) => {
                 return Err(Error::Usage(format!(
-                    "a film of {}x{} pixels with {} channels cannot be resumed as one of {}x{} with {}; render with the same size and integrator",
+                    "a film of {}x{} pixels with {} channels cannot be resumed as one of {}x{} with {}; \
+                     render with the same size and integrator",
                     s.size()[0],
                     s.size()[1],
                     s.channels(),
@@ -164,6 +168,8 @@ pub(crate) fn accumulate<E: Estimator>(
         out.film = state.film();
         out.state = Some(state);
     }
+
+    // Take step after step, until the film is finished or a stop is requested.
     let blocks = Block::cut(samples.size);
     let launcher = Launcher {
         tracer,
@@ -191,6 +197,8 @@ pub(crate) fn accumulate<E: Estimator>(
         }
     }
     run.sum_up();
+
+    // Complete the statistics.
     let mut out = run.out;
     tracer.check_finished()?;
     out.stopped_early = next.is_some();
@@ -224,7 +232,7 @@ struct Rate {
 }
 
 impl Rate {
-    /// Number of samples of `pixels` pixels that fit into `time`: at least one, and one before the first measurement.
+    /// Number of samples of `pixels` pixels that fit into `time`: one before the first measurement.
     fn fit(&self, time: Duration, pixels: u32) -> u32 {
         let each = self.seconds / self.samples as f64 * f64::from(pixels.max(1));
         if self.samples == 0 { 1 } else { ((time.as_secs_f64() / each.max(1e-9)) as u32).max(1) }
@@ -232,7 +240,7 @@ impl Rate {
 }
 
 impl<E: Estimator> Run<'_, E> {
-    /// Takes the samples of a step. Returns true if it stopped early, by the time limit or on request.
+    /// Takes the samples of a step. Returns true if a time limit or a request stopped it early.
     fn step(&mut self, step: &Step, control: &mut dyn Control) -> Result<bool> {
         let groups: Vec<TileGroup> =
             self.blocks.iter().enumerate().flat_map(|(number, block)| self.groups(step, number, block)).collect();
@@ -241,6 +249,7 @@ impl<E: Estimator> Run<'_, E> {
         let pixels_of = |tiles: usize| tiles as u64 * u64::from(TILE_PIXELS);
         let total = pixels_of(self.tile_samples.len()) * u64::from(self.samples.spp);
         let mut done = total - (u64::from(TILE_PIXELS) * step.left).min(total);
+
         for group in groups {
             // a stop was requested and these pixels have samples: start nothing more
             if stop_requested && group.first > 0 {
@@ -253,15 +262,17 @@ impl<E: Estimator> Run<'_, E> {
                 let left = limit.saturating_sub(self.start.elapsed());
                 Instant::now() + left.mul_f64(share.min(1.0))
             });
+
+            // Batches of as many samples as fit the time, by the measured rate.
             let mut pixel_batch = self.pixel_batch(&group)?;
             let (pixels, mut sample) = (pixels_of(group.tiles.len()), group.first);
             while sample < step.goal {
                 let keep = self.launcher.estimator.keeps_first() && sample == 0;
-                // as many samples as fit the time, by the measured rate
-                let most = match deadline {
+                let time = deadline.map(|d| d.saturating_duration_since(Instant::now()));
+                let most = match time {
                     _ if keep => 1,
                     None => u32::MAX,
-                    Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), pixel_batch.pixels),
+                    Some(time) => self.rates[group.number].fit(time, pixel_batch.pixels),
                 };
                 let batch = Batch::next(sample, step.goal, most, E::SAMPLE_BITS);
                 let before = done + pixels * u64::from(sample - group.first);
@@ -275,6 +286,8 @@ impl<E: Estimator> Run<'_, E> {
                     stop_requested = true;
                     break;
                 };
+
+                // Learn the rate, and look whether to stop.
                 sample += batch.samples();
                 let rate = &mut self.rates[group.number];
                 rate.seconds += began.elapsed().as_secs_f64();
@@ -290,6 +303,7 @@ impl<E: Estimator> Run<'_, E> {
                     break;
                 }
             }
+
             done += pixels * u64::from(step.goal - group.first);
             self.take(&group, &pixel_batch, sample)?;
         }
@@ -365,13 +379,13 @@ impl<E: Estimator> Run<'_, E> {
                 let mut words = [0u32; record_words(MAX_CHANNELS)];
                 let words = &mut words[..record_words(E::CHANNELS)];
                 bytemuck::cast_slice_mut::<u32, u8>(words).copy_from_slice(bytes);
-                let pixel = FilmPixel::of(words);
+                let pixel = FilmPixel::from_words(words);
                 traced += 1;
                 out.covered += u64::from(pixel.covered);
                 match &mut out.state {
                     Some(state) => {
                         let old = state.record_mut(at);
-                        out.covered -= u64::from(FilmPixel::of(old).covered);
+                        out.covered -= u64::from(FilmPixel::from_words(old).covered);
                         old.copy_from_slice(words);
                     }
                     None => out.film.set(at, &pixel, samples),
@@ -387,12 +401,12 @@ impl<E: Estimator> Run<'_, E> {
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
         self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
-        self.out.converged = self.samples.film.target_rmse.map(|target| TileErrors::of(&self.out.film).count(target));
+        self.out.converged = self.samples.film.target_rmse.map(|target| TileErrors::from_film(&self.out.film).count(target));
     }
 }
 
 impl TileGroup {
-    /// Index in an image of the given width of the pixel with this index on the device; `None` for padding.
+    /// Index in an image `width` pixels wide of a pixel of the device; `None` for padding.
     fn image_index(&self, tiles: Option<&[u32]>, index: u32, width: u32) -> Option<usize> {
         let index = match tiles {
             Some(tiles) => tiles[(index / TILE_PIXELS) as usize] * TILE_PIXELS + index % TILE_PIXELS,
@@ -411,8 +425,9 @@ struct Launcher<'a, E> {
 }
 
 impl<E: Estimator> Launcher<'_, E> {
-    /// Takes a batch of samples and returns it. On a stop request it restores the film and returns `None`, or, if the pixels have no
-    /// sample yet, takes a batch of one sample instead. `report` gets the completed share of the batch, in [0, 1].
+    /// Takes a batch of samples and returns it. On a stop request it restores the film and returns
+    /// `None`, or, if the pixels have no sample yet, takes a batch of one sample instead. `report`
+    /// gets the completed share of the batch, in [0, 1].
     fn batch(
         &mut self,
         pixel_batch: &mut PixelBatch,
@@ -426,8 +441,8 @@ impl<E: Estimator> Launcher<'_, E> {
         pixel_batch.save(&mut self.commands, batch)?;
         let (mut first, mut restarted) = (0u64, false);
         while first < (pixel_batch.pixels as u64) << batch.bits {
+            // A submission of several launches, each with all samples of its pixels.
             let all = (pixel_batch.pixels as u64) << batch.bits;
-            // launches contain all samples of a pixel
             let rays = self.pace.rays();
             let wanted = if keep { 1 } else { self.pace.launches() };
             let (begin, start) = (first, Instant::now());
@@ -445,6 +460,8 @@ impl<E: Estimator> Launcher<'_, E> {
                 });
                 first += count as u64;
             }
+
+            // Run it, and adapt the size of the next launches to its time.
             let timings = self.estimator.launch(&mut self.commands, &launches, keep)?;
             if first - begin >= rays as u64 * launches.len() as u64 {
                 self.pace.learn(rays, &timings, start.elapsed().as_secs_f64(), launches.len() as u32);
@@ -453,12 +470,13 @@ impl<E: Estimator> Launcher<'_, E> {
             if !restarted {
                 report(first as f64 / all as f64, control);
             }
+
+            // Abandon the batch on request; pixels without samples take one that cannot be stopped.
             if first < all && control.should_stop()? && (batch.first > 0 || batch.bits > 0) {
                 pixel_batch.restore(&mut self.commands, batch)?;
                 if batch.first > 0 {
                     return Ok(None);
                 }
-                // no samples yet: take one, which cannot be stopped
                 batch.bits = 0;
                 first = 0;
                 restarted = true;
@@ -494,7 +512,7 @@ impl PixelBatch {
         Ok(Self { params, tiles, pixels, film, before: None, _tile_buffer: tile_buffer })
     }
 
-    /// Backs the film up, so that a batch can be abandoned. Before the first batch the film is empty, which needs no backup.
+    /// Backs the film up, so that a batch can be abandoned; the first batch needs no backup.
     fn save(&mut self, commands: &mut Commands, batch: Batch) -> Result<()> {
         if batch.first == 0 {
             return Ok(());

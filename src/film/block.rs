@@ -1,5 +1,5 @@
-//! Blocks of the image: the pixels that one set of device buffers covers. Images larger than a block are rendered block by block, so
-//! that device memory does not grow with the image.
+//! Blocks of the image: the pixels of one set of device buffers, which does not grow with the
+//! image.
 
 use super::camera::CameraRecord;
 pub use crate::interface::records::block::{BlockParams, TILE};
@@ -75,7 +75,7 @@ impl Block {
         self.tiles() * TILE_PIXELS
     }
 
-    /// Pixel coordinates of a ray index within the block; outside `size` for padding. The same as the shaders' `block_pixel`.
+    /// Pixel of a ray index within the block, as in shaders; outside `size` for padding.
     pub fn pixel(&self, index: u32) -> [u32; 2] {
         let (tile, k) = (index >> 6, index & 63);
         let [x, y] = morton_pixel(k);

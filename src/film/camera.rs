@@ -58,16 +58,16 @@ pub fn choose(scene: &Scene, choice: &Choice, aspect: f64) -> Result<Camera> {
 pub struct CameraRecord {
     /// Camera to world relative to the scene's origin, three rows.
     pub camera_to_world: [[f32; 4]; 3],
-    /// Half width and half height of the view: tangents of the half angles, or scene units if orthographic.
+    /// Half width and height of the view: tangents of half angles, or scene units if orthographic.
     pub view: [f32; 2],
     /// Orthographic projection.
     pub orthographic: bool,
-    /// Distances of the near and the far clipping plane along the view direction, scene units; 0 and infinity: none.
+    /// Distances of the clipping planes along the view direction, scene units; 0, infinity: none.
     pub clip: [f32; 2],
 }
 
 impl CameraRecord {
-    /// The record for an image of `aspect` = width / height, relative to `origin`. The vertical field of view is the camera's.
+    /// The record for an image of `aspect` = width / height, relative to `origin`.
     pub fn new(camera: &Camera, origin: DVec3, aspect: f64) -> Self {
         let t = camera.camera_to_world;
         let relative = DAffine3 { translation: t.translation - origin, ..t };

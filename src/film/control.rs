@@ -10,7 +10,8 @@ pub trait Control {
         let _ = (done, total);
     }
 
-    /// The image has reached one of the requested sample counts ([`super::schedule::FilmOptions::intervals`]) and is not finished.
+    /// Called when an unfinished image reaches a requested sample count
+    /// ([`super::schedule::FilmOptions::intervals`]).
     ///
     /// # Errors
     /// An error ends the work.
@@ -24,7 +25,7 @@ pub trait Control {
         let _ = text;
     }
 
-    /// Reports that the finished image is all but black or white, one line. A warning, unless the image is only measured.
+    /// Reports in a line that the finished image is all but black or white, a warning.
     fn brightness(&mut self, text: &str) {
         self.warning(text);
     }

@@ -1,8 +1,9 @@
 //! Convergence of a film, tile by tile, estimated from the sample variances of its pixels.
 //!
-//! Stopping by such an estimate biases the image: a tile whose samples happened to miss a bright feature has a low variance, is
-//! stopped, and stays too dark. That is why nothing is tested before [`FIRST_CHECK`] samples, and why a tile continues while any of its eight
-//! neighbours has not converged: a feature that is rare in one tile is likely to have been sampled in one of nine.
+//! Stopping by such an estimate biases the image: a tile whose samples miss a bright feature has a
+//! low variance, is stopped, and stays too dark. So nothing is tested before [`FIRST_CHECK`]
+//! samples, and a tile continues while any of its eight neighbours has not converged: a feature
+//! that is rare in one tile is likely to have been sampled in one of nine.
 
 use super::Film;
 use super::block::TILE;
@@ -11,7 +12,7 @@ use super::state::tiles;
 /// Minimum number of samples per pixel before convergence is tested.
 pub const FIRST_CHECK: u32 = 64;
 
-/// Standard error of each tile: the root mean square over its pixels and channels of the standard error of the mean.
+/// Standard error of each tile: root mean square of its pixels' and channels' errors of the mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileErrors {
     size: [usize; 2],
@@ -29,7 +30,7 @@ pub struct TileCount {
 
 impl TileErrors {
     /// Estimates the errors of a film. Pixels with fewer than two samples have an infinite error.
-    pub fn of(film: &Film) -> Self {
+    pub fn from_film(film: &Film) -> Self {
         let size = tiles([film.width, film.height]);
         let mut sums = vec![(0.0, 0u32); size[0] * size[1]];
         for (index, &samples) in film.samples.iter().enumerate() {
@@ -43,15 +44,15 @@ impl TileErrors {
         Self { size, errors: sums.into_iter().map(|(sum, n)| (sum / f64::from(n.max(1))).sqrt()).collect() }
     }
 
-    /// For each tile, true if it has not converged: its error, or that of one of its eight neighbours, exceeds `target` or is NaN.
+    /// For each tile, true if its error, or that of one of its eight neighbours, exceeds `target`.
     pub fn unconverged(&self, target: f64) -> Vec<bool> {
         let [width, height] = self.size;
         let enough = |x: usize, y: usize| self.errors[y * width + x] <= target;
-        let around = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
+        let neighbours = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
         (0..width * height)
             .map(|tile| {
                 let (x, y) = (tile % width, tile / width);
-                !around(y, height).all(|y| around(x, width).all(|x| enough(x, y)))
+                !neighbours(y, height).all(|y| neighbours(x, width).all(|x| enough(x, y)))
             })
             .collect()
     }
@@ -72,28 +73,28 @@ mod tests {
         let mut film = Film::new(38, 20, 3);
         film.samples.fill(64);
         film.variance.fill(0.64);
-        let quiet = TileErrors::of(&film);
+        let quiet = TileErrors::from_film(&film);
         assert_eq!(quiet.errors.len(), 15);
         assert!(quiet.errors.iter().all(|e| (e - 0.1).abs() < 1e-6));
         assert_eq!(quiet.count(0.1001), TileCount { done: 15, all: 15 });
         assert_eq!(quiet.count(0.0999), TileCount { done: 0, all: 15 });
         // one pixel of the first tile makes four tiles wait
         film.variance[3 * (38 + 1) + 1] = 64.0;
-        let errors = TileErrors::of(&film);
+        let errors = TileErrors::from_film(&film);
         let expected = ((191.0 * 0.01 + 1.0) / 192.0f64).sqrt();
         assert!((errors.errors[0] - expected).abs() < 1e-6, "{}, expected {expected}", errors.errors[0]);
         let open = errors.unconverged(0.11);
         assert_eq!((0..15).filter(|&t| open[t]).collect::<Vec<_>>(), [0, 1, 5, 6]);
         // in the middle it would be nine
         film.variance[3 * (38 * 12 + 20)] = 64.0;
-        assert_eq!(TileErrors::of(&film).count(0.11).done, 15 - 11);
+        assert_eq!(TileErrors::from_film(&film).count(0.11).done, 15 - 11);
         // pixels with fewer than two samples have not converged
         film.variance.fill(0.0);
         film.samples[0] = 1;
-        assert_eq!(TileErrors::of(&film).count(1e9).done, 11);
+        assert_eq!(TileErrors::from_film(&film).count(1e9).done, 11);
         film.samples[0] = 2;
-        assert_eq!(TileErrors::of(&film).count(0.0).done, 15);
+        assert_eq!(TileErrors::from_film(&film).count(0.0).done, 15);
         film.variance[0] = f32::NAN;
-        assert_eq!(TileErrors::of(&film).count(f64::INFINITY).done, 11);
+        assert_eq!(TileErrors::from_film(&film).count(f64::INFINITY).done, 11);
     }
 }

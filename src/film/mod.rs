@@ -1,9 +1,11 @@
-//! The film: sums per pixel on the device, means and variances on the host. [`state`] has the exact sums that are saved to resume a
-//! render.
+//! The film: sums per pixel on the device, means and variances on the host. [`state`] has exact
+//! sums.
 //!
-//! A render is a number of *steps* ([`schedule`]): each brings some tiles of the image to a number of samples, and between two of them a render may end or be saved.
-//! A step goes over the image in *blocks* ([`block`]), as many pixels as device buffers hold; a block in batches of samples ([`accumulate`]); a batch in launches of at
-//! most so many rays that each takes about 0.05 s ([`pace`]). The image depends on none of these sizes.
+//! A render is a number of *steps* ([`schedule`]): each brings some tiles to a number of samples,
+//! and between two of them a render may end or be saved. A step goes over the image in *blocks*
+//! ([`block`]), as many pixels as device buffers hold; a block in batches of samples
+//! ([`accumulate`]); a batch in launches of about 0.05 s ([`pace`]). The image depends on none of
+//! these.
 
 pub mod accumulate;
 pub mod block;
@@ -24,13 +26,14 @@ use crate::interface::records::film::{RgbFilmPixel, ScalarFilmPixel};
 /// Maximum number of channels of a film.
 pub const MAX_CHANNELS: usize = 3;
 
-/// 32-bit words of a pixel's record on the device: for each channel a compensated sum (the sum and its excess, after Kahan), then for each
-/// channel a compensated sum of squares, then two counts. [`ScalarFilmPixel`] has one channel and [`RgbFilmPixel`] three.
+/// 32-bit words of a pixel's record on the device: for each channel a compensated sum (the sum and
+/// its excess, after Kahan), then for each channel a compensated sum of squares, then two counts.
 pub const fn record_words(channels: usize) -> usize {
     4 * channels + 2
 }
 
-const _: () = assert!(size_of::<ScalarFilmPixel>() == 4 * record_words(1) && size_of::<RgbFilmPixel>() == 4 * record_words(3));
+const _: () = assert!(size_of::<ScalarFilmPixel>() as u64 == record_bytes(1));
+const _: () = assert!(size_of::<RgbFilmPixel>() as u64 == record_bytes(3));
 
 /// Bytes of a pixel's record on the device.
 pub const fn record_bytes(channels: usize) -> u64 {
@@ -50,7 +53,7 @@ pub struct FilmPixel {
 
 impl FilmPixel {
     /// Decodes a record of [`record_words`] words.
-    pub fn of(words: &[u32]) -> Self {
+    pub fn from_words(words: &[u32]) -> Self {
         let channels = (words.len() - 2) / 4;
         // the compensation is the excess of the rounded sum
         let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
@@ -79,6 +82,14 @@ impl FilmPixel {
     pub fn coverage(&self, samples: u32) -> f64 {
         f64::from(self.covered) / f64::from(samples.max(1))
     }
+}
+
+/// Mean over covered pixels and `channels` interleaved channels; 0 if nothing is covered.
+pub fn covered_mean(values: &[f32], channels: usize, coverage: &[f32]) -> f64 {
+    let covered: f64 = coverage.iter().map(|&x| f64::from(x)).sum();
+    let values = values.iter().enumerate().filter(|(k, _)| coverage[k / channels] > 0.0);
+    let sum: f64 = values.map(|(_, &x)| f64::from(x)).sum();
+    if covered > 0.0 { sum / (covered * channels as f64) } else { 0.0 }
 }
 
 /// A finished film, rows from the top.
@@ -154,14 +165,14 @@ impl Film {
         (least, sum as f64 / self.samples.len().max(1) as f64, self.samples.iter().copied().max().unwrap_or(0))
     }
 
-    /// RMSE of the image, estimated from the variances of its pixels: the root mean square, over pixels and channels, of the standard error of the
-    /// mean. Stratified sampling makes the true error smaller.
+    /// RMSE of the image, estimated from the variances of its pixels: the root mean square of the
+    /// standard errors of the means. Stratified sampling makes the true error smaller.
     pub fn estimated_rmse(&self) -> f64 {
         (self.summed_square_errors() / self.mean.len().max(1) as f64).sqrt()
     }
 
-    /// Mean over all pixels and channels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
-    /// smaller than that; correlation between channels makes it larger.
+    /// Mean over all pixels and channels and its standard error, from the pixels' own variances.
+    /// Stratification makes the true error smaller, correlation between channels larger.
     pub fn mean_and_error(&self) -> (f64, f64) {
         let n = self.mean.len().max(1) as f64;
         let mean = self.mean.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
@@ -169,7 +180,7 @@ impl Film {
     }
 
     fn summed_square_errors(&self) -> f64 {
-        let of = |k: usize| f64::from(self.samples[k / self.channels].max(1));
-        self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / of(k)).sum()
+        let samples = |k: usize| f64::from(self.samples[k / self.channels].max(1));
+        self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / samples(k)).sum()
     }
 }

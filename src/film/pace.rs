@@ -1,13 +1,16 @@
-//! Adapts the size of launches: no dispatch should run longer than about a tenth of a second, because drivers reset devices
-//! that do not respond and users want to cancel.
+//! Adapts launches to a twentieth of a second: drivers reset devices that are busy, users cancel.
 
+use std::time::Instant;
+
+use super::Control;
+use crate::error::Result;
 use crate::gpu::Timing;
 
 /// Target duration of a launch, seconds.
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Maximum number of rays in a launch on every device. Passes address results relative to a launch's first ray, so the tracer must not split launches.
+/// Maximum number of rays in a launch on every device, which the tracer must not split.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Chooses the size of launches from the measured time of earlier ones.
@@ -35,10 +38,35 @@ impl Pace {
         self.rays
     }
 
-    /// Number of launches in one submission, so that the host regains control about ten times a second.
+    /// Number of launches in a submission: the host regains control about ten times a second.
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
         if self.rays < self.most { 2 } else { 4 }
+    }
+
+    /// Runs `count` threads or rays in launches, which `run` makes from their first and number, and
+    /// asks `control` between them whether to stop.
+    ///
+    /// # Errors
+    /// Those of `run` and `control`.
+    pub fn run_launches(
+        &mut self,
+        count: u32,
+        control: &mut dyn Control,
+        mut run: impl FnMut(u32, u32) -> Result<Vec<Timing>>,
+    ) -> Result<()> {
+        let mut first = 0;
+        while first < count {
+            let n = self.rays.min(count - first);
+            let start = Instant::now();
+            let timings = run(first, n)?;
+            if n == self.rays {
+                self.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
+            }
+            control.should_stop()?;
+            first += n;
+        }
+        Ok(())
     }
 
     /// Learns from the longest region of a submission whose launches had at most `rays` rays.
@@ -47,7 +75,7 @@ impl Pace {
         // without timestamps, the wall time is divided evenly among the launches
         let seconds = if longest > 0.0 { longest } else { wall / launches.max(1) as f64 };
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
-        // the first launch may have compiled the shader: its time is an upper bound that says little
+        // the first launch may have compiled the shader: its time says little
         let growth = if self.seen { 2.0 } else { 4.0 };
         let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, self.most as f64);
         self.rays = (next as u32) & !63;

@@ -45,7 +45,7 @@ impl Default for SampleSettings {
 }
 
 impl SampleSettings {
-    /// Settings of so many samples per pixel of an image of `size` pixels, all others their defaults.
+    /// Settings of `spp` samples per pixel of an image of `size` pixels, all others their defaults.
     pub fn new(size: [u32; 2], spp: u32, seed: u32) -> Self {
         Self { size, spp, seed, ..Self::default() }
     }

@@ -1,5 +1,6 @@
-//! Schedules the samples of a film: all at once, or in steps between which it is saved or tested for convergence. A step depends on the
-//! film alone, so a render that is saved and resumed between two steps takes the same samples as an uninterrupted one.
+//! Schedules the samples of a film: all at once, or in steps between which it is saved or tested
+//! for convergence. A step depends on the film alone, so that resumed renders take the same
+//! samples.
 
 use std::sync::Arc;
 
@@ -10,14 +11,14 @@ use super::state::FilmState;
 /// Initial state of a film, its intermediate stops, and whether its sums are kept.
 #[derive(Clone, Debug, Default)]
 pub struct FilmOptions {
-    /// Resume from this state with the next samples. Its size and channels must be those of the image.
+    /// State to resume from, with the next samples; size and channels must be those of the image.
     pub start: Option<Arc<FilmState>>,
     /// Return the film's exact sums.
     pub keep_state: bool,
     /// Samples per pixel at which [`crate::film::Control::interval`] is called, ascending.
     pub intervals: Vec<u32>,
-    /// Stop sampling tiles whose standard error is at most this (in units of the image), tested at powers of two of samples from
-    /// [`FIRST_CHECK`] on. The samples per pixel are then the maximum.
+    /// Stop sampling tiles whose standard error is at most this, tested at powers of two of samples
+    /// from [`FIRST_CHECK`] on. The samples per pixel are then the maximum.
     pub target_rmse: Option<f64>,
 }
 
@@ -38,17 +39,17 @@ impl FilmOptions {
         self.start.is_some() || self.keep_state || !self.intervals.is_empty() || self.target_rmse.is_some()
     }
 
-    /// The next step towards `spp` samples of a film whose tiles have `tile_samples` each; `None` if it is finished.
+    /// The next step to `spp` samples of a film of tiles with `tile_samples`; `None` at the end.
     pub(crate) fn next(&self, spp: u32, tile_samples: &[u32], film: &Film) -> Option<Step> {
         let below = |n: u32| n < spp;
         let mut tiles: Vec<bool> = tile_samples.iter().map(|&n| below(n)).collect();
         if let Some(target) = self.target_rmse {
-            // a film saved between two checks first brings its tiles to the next check (or stops at `spp`), so that where it was saved
-            // does not change which tiles are tested
+            // a film saved between two checks first brings its tiles to the next check (or stops at
+            // `spp`), so that where it was saved does not change which tiles are tested
             if tile_samples.iter().any(|&n| !is_check(n)) {
                 tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= !is_check(n));
             } else if tiles.contains(&true) {
-                let open = TileErrors::of(film).unconverged(target);
+                let open = TileErrors::from_film(film).unconverged(target);
                 tiles.iter_mut().zip(open).for_each(|(tile, open)| *tile &= open);
             }
         }

@@ -1,10 +1,10 @@
-//! The exact state of a film: the sums of every pixel as the device stores them, and their sample counts. A render resumed from it is
-//! bit-identical to an uninterrupted one.
+//! The exact state of a film: the sums of every pixel as the device stores them, and their sample
+//! counts. A render resumed from it is bit-identical to an uninterrupted one.
 
 use super::block::TILE;
 use super::{Film, FilmPixel, record_words};
 
-/// The exact state of a film. Samples are taken tile by tile, so all pixels of a tile have the same number of samples.
+/// The exact state of a film. All pixels of a tile have the same number of samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilmState {
     size: [u32; 2],
@@ -50,8 +50,8 @@ impl FilmState {
         }
     }
 
-    /// From a plane of each word ([`words`]) and the samples taken of each pixel, rows from the top. `None` where the pixels of a tile have
-    /// different numbers of samples, or more samples were rejected than taken: no film writes such a state.
+    /// From a plane of each word ([`words`]) and the samples taken of each pixel, rows from the
+    /// top. `None` for states that no film writes, as with different numbers of samples in a tile.
     pub fn from_planes(size: [u32; 2], channels: usize, planes: &[Vec<u32>], samples: &[u32]) -> Option<Self> {
         let mut state = Self::new(size, channels);
         let record = record_words(channels);
@@ -125,7 +125,7 @@ impl FilmState {
     pub fn film(&self) -> Film {
         let mut film = Film::new(self.size[0], self.size[1], self.channels);
         for (index, words) in self.words.chunks_exact(record_words(self.channels)).enumerate() {
-            film.set(index, &FilmPixel::of(words), self.tile_samples[tile_of(self.size, index)]);
+            film.set(index, &FilmPixel::from_words(words), self.tile_samples[tile_of(self.size, index)]);
         }
         film
     }

@@ -1,7 +1,7 @@
-//! The tiles of an image that can contain geometry. Camera rays through the others hit nothing and need not be traced.
+//! The tiles of an image that can contain geometry. Camera rays through the others need no tracing.
 //!
-//! The screen bounding rectangle of every primitive is marked, with a margin for the rounding of the rays, so the mask is conservative:
-//! unmarked tiles are certain to be empty.
+//! The screen bounding rectangle of every primitive is marked, with a margin for the rounding of
+//! the rays, so the mask is conservative: unmarked tiles are certain to be empty.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,14 +14,14 @@ use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::scene::Geometry;
 
-/// Maximum number of instanced primitives per camera ray that are projected one by one: above that, tracing the rays costs less.
-/// A projection takes 10 to 20 ns, a camera ray that misses a good scene's hierarchy about 50 ns.
+/// Maximum number of instanced primitives per camera ray that are projected: above it, tracing
+/// costs less. A projection takes 10 to 20 ns, a camera ray that misses a hierarchy about 50.
 const PRIMITIVES_PER_RAY: f64 = 0.5;
 /// Relative rounding of ray origins, directions and transformed vertices: 16 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64 * 0.5;
 /// Minimum margin, pixels.
 const MIN_MARGIN: f64 = 0.5;
-/// Maximum margin, pixels. With a larger one (a view too narrow for single precision) no tile is skipped.
+/// Maximum margin, pixels: no tile is skipped in views too narrow for single precision.
 const MAX_MARGIN: f64 = 64.0;
 
 /// The tiles of an image that can contain geometry.
@@ -49,17 +49,14 @@ struct Rectangle {
 }
 
 impl TileMask {
-    /// The mask of an image of `size` pixels with `spp` samples each. `None` if no tile can be skipped: the camera is inside or
-    /// beside the scene's bounds, or every tile is marked.
+    /// The mask of an image of `size` pixels with `spp` samples each. `None` if no tile can be
+    /// skipped: the camera is inside or beside the scene's bounds, or every tile is marked.
     pub fn new(flat: &FlatScene, camera: &CameraRecord, size: [u32; 2], spp: u32) -> Option<Self> {
         let bounds = flat.bounds();
         let view = View::new(camera, size, bounds, &flat.instances)?;
-        let tiles_x = size[0].div_ceil(TILE);
-        let tiles = Marks {
-            tiles_x,
-            tiles_y: size[1].div_ceil(TILE),
-            live: std::iter::repeat_with(AtomicBool::default).take((tiles_x * size[1].div_ceil(TILE)) as usize).collect(),
-        };
+        let [tiles_x, tiles_y] = size.map(|n| n.div_ceil(TILE));
+        let live = std::iter::repeat_with(AtomicBool::default).take((tiles_x * tiles_y) as usize).collect();
+        let tiles = Marks { tiles_x, tiles_y, live };
         // the scene's bounds first: for a distant scene they cover only a small part of the image
         let whole = view.rectangle(bounds, &DAffine3::IDENTITY)?;
         let placed: f64 = flat.instances.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
@@ -102,7 +99,7 @@ fn mark_part(flat: &FlatScene, placement: &TlasInstance, group: &BlasGroup, part
                 .map(|v| view.project(&to_world, flat.vertex(part, v)))
                 .collect();
             mesh.indices.par_iter().with_min_len(4096).for_each(|corners| {
-                let r = Rectangle::around(corners.iter().map(|&c| image[c as usize]));
+                let r = Rectangle::bounding(corners.iter().map(|&c| image[c as usize]));
                 tiles.mark(r, view.margin);
             });
         }
@@ -139,7 +136,7 @@ impl View {
         let corners = corners(bounds).map(|c| view.world_to_camera.transform_point3(c));
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
-        // as in oracle/rounding.rs: going to a group's space and back errs by the translation too, and the more the worse conditioned
+        // as in oracle/rounding.rs: going to an ill-conditioned group's space and back errs more
         let moved = || instances.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
         let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
         let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
@@ -149,9 +146,10 @@ impl View {
             return None;
         }
         // error of points and directions on the image plane at unit distance
-        let error = match view.orthographic {
-            true => ROUNDING * (coordinates + half[0] + half[1] + reach),
-            false => ROUNDING * (coordinates / near + 1.0) * (1.0 + half[0] * half[0] + half[1] * half[1]),
+        let error = if view.orthographic {
+            ROUNDING * (coordinates + half[0] + half[1] + reach)
+        } else {
+            ROUNDING * (coordinates / near + 1.0) * (1.0 + half[0] * half[0] + half[1] * half[1])
         };
         view.margin = MIN_MARGIN + error * view.scale[0].max(view.scale[1]);
         (view.margin <= MAX_MARGIN).then_some(view)
@@ -169,7 +167,7 @@ impl View {
         let corners = corners(bounds);
         let before = |c: &DVec3| -self.world_to_camera.transform_point3(to_world.transform_point3(*c)).z > 0.0;
         (self.orthographic || corners.iter().all(before))
-            .then(|| Rectangle::around(corners.into_iter().map(|c| self.project(to_world, c.as_vec3()))))
+            .then(|| Rectangle::bounding(corners.into_iter().map(|c| self.project(to_world, c.as_vec3()))))
     }
 }
 
@@ -186,7 +184,7 @@ fn corners(b: Aabb) -> [DVec3; 8] {
 }
 
 impl Rectangle {
-    fn around(points: impl Iterator<Item = [f64; 2]>) -> Self {
+    fn bounding(points: impl Iterator<Item = [f64; 2]>) -> Self {
         points.fold(Self { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] }, |r, p| Self {
             min: [r.min[0].min(p[0]), r.min[1].min(p[1])],
             max: [r.max[0].max(p[0]), r.max[1].max(p[1])],
@@ -214,7 +212,7 @@ impl Marks {
         for y in first(r.min[1])..end(r.max[1], self.tiles_y) {
             for x in first(r.min[0])..end(r.max[0], self.tiles_x) {
                 let tile = &self.live[(y * self.tiles_x + x) as usize];
-                // most tiles are marked already: a read does not invalidate other cores' cache lines
+                // most tiles are marked already: a read does not invalidate other cores' cache
                 if !tile.load(Ordering::Relaxed) {
                     tile.store(true, Ordering::Relaxed);
                 }
@@ -228,8 +226,7 @@ mod tests {
     use super::*;
     use crate::scene::{Camera, Instance, Material, Mesh, Scene, TriangleMesh};
 
-    /// Two instances of a triangle whose vertices are `far` from their mesh's origin, both brought back to the world's, and turned
-    /// and stretched by `matrix`.
+    /// A triangle far from its mesh's origin, twice, brought back and deformed by `matrix`.
     fn brought_back(far: f64, matrix: DMat3) -> Scene {
         let positions = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| (p + DVec3::splat(far)).as_vec3()).to_vec();
         let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2]], ..Default::default() };
@@ -260,7 +257,7 @@ mod tests {
         assert!(near.margin < MIN_MARGIN + 0.01, "{}", near.margin);
         let scene = brought_back(1.0e6, DMat3::IDENTITY);
         let far = view(&scene).unwrap();
-        // a ray's origin, rounded where the vertices are, is off by half an ulp of each coordinate; so its hit may be seen so far beside
+        // a ray's origin is rounded by half an ulp, so its hit may be seen beside
         let ulp = (1.0e6f32.next_up() - 1.0e6f32) as f64;
         let to_world = FlatScene::new(&scene).instances[0].to_world;
         let at = |p: DVec3| {

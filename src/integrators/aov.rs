@@ -45,7 +45,8 @@ impl Aov {
     }
 }
 
-/// Renders the outputs of an image, rows from the top. The tracer must have been built with the [`crate::tracer::Needs`] of the outputs.
+/// Renders the outputs of an image, rows from the top. The tracer must have been built with the
+/// [`crate::tracer::Needs`] of the outputs.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
     render_with(tracer, camera, size, Primary::Traced, control)
 }
@@ -63,8 +64,8 @@ pub fn render_with(
     Ok(out)
 }
 
-/// As [`render_with`], but without storing the image: `take` receives each pixel once, with its index (rows from the top), in an order that depends on the image
-/// size alone.
+/// As [`render_with`], without storing the image: `take` receives each pixel once, with its index
+/// (rows from the top), in an order that depends on the image size alone.
 pub fn visit(
     tracer: &Tracer,
     camera: &CameraRecord,
@@ -73,6 +74,7 @@ pub fn visit(
     control: &mut dyn Control,
     take: &mut dyn FnMut(usize, &AovPixel),
 ) -> Result<()> {
+    // Buffers for the largest block, and for a launch.
     let device = tracer.device();
     let blocks = Block::cut(size);
     let rays = CameraRays::new(tracer, &shaders::AOV_CLOSEST, primary, blocks.first().map_or([1; 2], |b| b.size))?;
@@ -81,8 +83,10 @@ pub fn visit(
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MAX_RAYS);
     let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Device)?;
     let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
+
     let mut pace = Pace::default();
     for block in &blocks {
+        // Rasterize the block, if primary visibility is.
         let params = BlockParams { aov: target.address(), ..block.params(size, camera, 0) };
         if let Some(bytes) = params_buffer.bytes_mut() {
             bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
@@ -93,17 +97,12 @@ pub fn visit(
             commands.run(|r| drawn = rays.draw(r, tracer, &view))?;
             drawn?;
         }
-        let mut first = 0;
-        while first < block.rays() {
-            let launch = pace.rays();
-            let count = launch.min(block.rays() - first);
-            let push =
-                Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
-            let start = std::time::Instant::now();
+
+        // Launch after launch, whose pixels are read back.
+        let (scene, pass) = (tracer.scene_address(), params_buffer.address());
+        pace.run_launches(block.rays(), control, |first, count| {
+            let push = Push { scene, pass, first, count, ..Default::default() };
             let timings = commands.run(|r| rays.record(r, &push))?;
-            if count == launch {
-                pace.learn(launch, &timings, start.elapsed().as_secs_f64(), 1);
-            }
             target.read_with(0, record * count as u64, record, |begin, bytes| {
                 for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {
                     if let Some(at) = block.image_index(first + begin as u32 + k as u32, size[0]) {
@@ -111,21 +110,17 @@ pub fn visit(
                     }
                 }
             })?;
-            control.should_stop()?;
-            first += count;
-        }
+            Ok(timings)
+        })?;
     }
     tracer.check_finished()
 }
 
-/// Auxiliary outputs as channels of an image. `origin`: origin of the tracer's scene in world space.
+/// Auxiliary outputs as channels of an image. `origin` is that of the tracer's scene.
 pub fn channels(wanted: &[Aov], pixels: &[AovPixel], origin: DVec3) -> Vec<Channel> {
     let wants = |aov: Aov| aov.is_in(wanted);
     let mut out = Vec::new();
-    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel {
-        name: name.into(),
-        samples: Samples::F32(pixels.iter().map(f).collect()),
-    };
+    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel::from_floats(name, pixels.iter().map(f).collect());
     let ids = |name: &str, f: &dyn Fn(&AovPixel) -> u32| Channel {
         name: name.into(),
         samples: Samples::U32(pixels.iter().map(f).collect()),

@@ -15,7 +15,7 @@ use crate::settings::parse::{parse_factor, parse_number};
 use crate::settings::{AppliesTo, Capability, settings};
 
 /// Integrators that lights apply to.
-const LIT: AppliesTo = AppliesTo::of(Capability::SceneLights);
+const LIT: AppliesTo = AppliesTo::all_of(Capability::SceneLights);
 
 settings! {
     /// Light besides the scene's.

@@ -1,7 +1,8 @@
-//! Integrators of stills, one folder each. [`ALL`] is the only list of them; the command line, the renderer and reports
-//! access an integrator through the trait [`Integrator`].
+//! Integrators of stills, one folder each. [`ALL`] is the only list of them; the command line, the
+//! renderer and reports access an integrator through the trait [`Integrator`].
 //!
-//! [`aov`] renders auxiliary outputs, [`rays`] traces a given set of rays, and [`ray_sets`] makes those of an image.
+//! [`aov`] renders auxiliary outputs, [`rays`] traces a set of rays, and [`ray_sets`] makes those
+//! of an image.
 
 mod all;
 pub mod ao;
@@ -107,7 +108,7 @@ pub trait Integrator: Sync {
     /// Description in one line.
     fn help(&self) -> &'static str;
 
-    /// What it can do: by this settings know whether they apply to it.
+    /// Capabilities, by which settings know whether they apply.
     fn capabilities(&self) -> &'static [Capability];
 
     /// Returns true if it can do this.
@@ -127,7 +128,7 @@ pub trait Integrator: Sync {
     /// Scene data that it needs in device memory.
     fn needs(&self, settings: &IntegratorSettings) -> Needs;
 
-    /// Streams that it will trace, as far as they are known before the scene is loaded: they are compiled while the BVH is built.
+    /// Streams that it will trace, as far as known without the scene, to be compiled early.
     fn streams(&self, settings: &IntegratorSettings) -> Vec<&'static StreamShaders>;
 
     /// Approximate number of rays per sample, by which the quality of the BVH build is chosen.
@@ -139,20 +140,21 @@ pub trait Integrator: Sync {
     /// Returns true if the image depends on the scene's environment.
     fn sees_environment(&self) -> bool;
 
-    /// Returns true if the image shows the environment, or a light infinitely far away, where there is no surface.
+    /// Returns true if the image shows the environment, or a light infinitely far away.
     fn shows_environment(&self, scene: &Scene) -> bool {
         let _ = scene;
         false
     }
 
-    /// Everything that the samples of an image depend on besides scene, camera, size and seed: metadata keys and values. `None`: the key is absent from the
-    /// metadata.
+    /// Everything that the samples of an image depend on besides scene, camera, size and seed: keys
+    /// and values of metadata; `None`: the key is absent.
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
 
-    /// Renders.
+    /// Renders a still.
     ///
     /// # Errors
-    /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera; [`crate::Error::Interrupted`] when `control` says so.
+    /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera;
+    /// [`crate::Error::Interrupted`] when `control` says so.
     fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered>;
 
     /// Converts the image to what an 8-bit file shows.
@@ -173,7 +175,7 @@ pub trait Integrator: Sync {
     /// Those of [`Integrator::render`] that settings have.
     fn denoise_options(&self, job: &RenderJob) -> Result<Option<path::PathOptions>> {
         let path = self.path_options(job)?;
-        // ambient occlusion is like the light of a white sky: its noise does not depend on materials
+        // ambient occlusion is the light of a white sky: its noise does not depend on materials
         let grey = || path::PathOptions { samples: job.samples.clone(), white_sky: Some(1.0), ..Default::default() };
         Ok(path.or_else(|| self.can(Capability::Denoising).then(grey)))
     }
@@ -190,8 +192,7 @@ impl RenderJob<'_> {
         CameraRecord::new(self.camera, flat.origin, self.aspect())
     }
 
-    /// Finds the tiles of the image that can show geometry; `None` if the integrator needs all
-    /// tiles.
+    /// Finds the tiles of the image that can show geometry; `None` if all tiles are needed.
     pub fn tile_mask(&self, integrator: &dyn Integrator, flat: &FlatScene, camera: &CameraRecord) -> Option<Arc<TileMask>> {
         if !integrator.skips_empty_tiles(self) {
             return None;

@@ -1,4 +1,4 @@
-//! Sets of rays to measure tracers with: made by skylit's own passes, so that they are those of an image, in the order of the renderer.
+//! Sets of rays to measure tracers with: those of an image, in the order of skylit's own passes.
 
 use glam::DVec3;
 
@@ -12,8 +12,8 @@ use crate::sampling::sobol::hash_combine;
 use crate::scene::{Camera, Geometry, Scene};
 use crate::tracer::Tracer;
 
-/// Rays that stay together when a slow tracer gets only a part of a set: at least and at most. Fewer than a work-group of them would
-/// be less coherent than the set.
+/// Minimum and maximum rays that stay together when a slow tracer gets a part of a set. Fewer than
+/// a work-group of them would be less coherent than the set.
 const CHUNK: [usize; 2] = [64, 1024];
 /// Chunks that a part of a set has at least, so that it is from all over the image.
 const CHUNKS: usize = 32;
@@ -22,7 +22,7 @@ const SEED: u32 = 1;
 /// A set of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RaySet {
-    /// Through the pixels, in tiles of 8x8, Morton order within (so 4x2 pixels are eight rays in a row).
+    /// Through the pixels, in tiles of 8x8, Morton order within (4x2 pixels are eight rays).
     Primary,
     /// One from each visible point, cosine-distributed; in the order of the pixels.
     Occlusion,
@@ -56,7 +56,8 @@ impl RaySet {
 pub struct RaySets([Vec<Ray>; 4]);
 
 impl RaySets {
-    /// Makes them with a tracer: ambient occlusion rays of length `ao_radius`, shadow rays to a point light (world coordinates).
+    /// Makes them with a tracer: ambient occlusion rays of length `ao_radius`, shadow rays to a
+    /// point light (world coordinates).
     ///
     /// # Errors
     /// Those of the device.
@@ -88,8 +89,7 @@ impl RaySets {
     }
 }
 
-/// From the origin of each occlusion ray, which is the visible point moved off its surface, to the light, where the surface
-/// faces it.
+/// From the origins of occlusion rays, visible points moved off surfaces, to the light before them.
 fn shadow_rays(scene: &Scene, primary: &[Ray], hits: &[Hit], occlusion: &[Ray], light: DVec3) -> Result<Vec<Ray>> {
     let met: Vec<usize> = (0..hits.len()).filter(|&i| hits[i].is_hit()).collect();
     if met.len() != occlusion.len() {
@@ -112,7 +112,7 @@ fn shadow_rays(scene: &Scene, primary: &[Ray], hits: &[Hit], occlusion: &[Ray], 
     Ok(rays.collect())
 }
 
-/// A normal of what a ray met near `at` (relative to the scene's origin), on either side, of any length.
+/// A normal, of either side and any length, of a hit near `at` (relative to the scene's origin).
 fn normal(scene: &Scene, hit: &Hit, at: DVec3) -> Option<DVec3> {
     let instance = scene.instances.get(hit.instance as usize)?;
     let to_world = instance.object_to_world;
@@ -140,8 +140,8 @@ fn shuffle(rays: &[Ray]) -> Vec<Ray> {
     out
 }
 
-/// About one ray in `divisor`, in chunks from all over the set, in its order. Of a small set more: what is too few to be from all over
-/// it says nothing about it, and takes no time.
+/// About one ray in `divisor`, in chunks from all over the set, in its order. Of a small set more:
+/// too few to be from all over it say nothing about it, and take no time.
 pub fn sample(rays: &[Ray], divisor: usize) -> Vec<Ray> {
     let chunk = (rays.len() / (divisor.max(1) * CHUNKS)).clamp(CHUNK[0], CHUNK[1]) / CHUNK[0] * CHUNK[0];
     let step = divisor.min(rays.len() / (chunk * CHUNKS)).max(1);
@@ -194,7 +194,7 @@ mod tests {
         }
     }
 
-    /// A plane seen from above: light above it reaches its points, light below it does not, whichever way it is wound.
+    /// Light above a plane reaches its points, light below it does not, however it is wound.
     #[test]
     fn shadow_rays_start_where_the_surface_faces_the_light() {
         for mirrored in [false, true] {

@@ -50,8 +50,8 @@ pub fn check(rays: &[Ray]) -> Result<()> {
     }
 }
 
-/// Traces the set `repeats` times (at least once) after a warm-up, which finds the size of launches, and returns the hits. In mode [`Mode::Any`] an occluded
-/// ray's hit has t = 0 and no ids.
+/// Traces the set `repeats` times (at least once) after a warm-up, and returns the hits. In mode
+/// [`Mode::Any`] those of occluded rays have t = 0 and no ids.
 pub fn trace(
     tracer: &Tracer,
     rays: &[Ray],
@@ -114,8 +114,9 @@ impl<'t> PreparedRays<'t> {
         if mode == Mode::Any { 4 } else { size_of::<Hit>() as u64 }
     }
 
-    /// Traces the whole set once; returns device seconds (wall clock seconds if the device has no timestamps) and wall clock seconds, submission included. The
-    /// first call finds the size of launches and makes the driver compile: its times are not representative.
+    /// Traces the whole set once; returns device seconds (wall clock seconds if the device has no
+    /// timestamps) and wall clock seconds, submission included. The first call finds the size of
+    /// launches and makes the driver compile: its times are not representative.
     pub fn pass(&mut self, control: &mut dyn Control) -> Result<(f64, f64)> {
         let (n, learning) = (self.count, self.passes == 0);
         let (mut first, mut device_seconds, mut wall_seconds) = (0, 0.0, 0.0);

@@ -1,4 +1,5 @@
-//! Specialization constants: values that the scene, the device or an option fixes before the driver compiles a shader. This file assigns their ids.
+//! Specialization constants, fixed before the driver compiles a shader. This file assigns their
+//! ids.
 
 /// A specialization constant of 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use crate::settings::choices;
 
 /// An enumeration, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
-    /// Its file in interface/.
+    /// Name of the file in interface/.
     pub name: &'static str,
     /// Names in the shaders, their numbers, and what they mean.
     pub variants: Vec<(&'static str, u32, &'static str)>,
@@ -12,7 +12,7 @@ pub(super) struct Declaration {
 
 impl Declaration {
     /// A choice, whose help texts say what the variants mean.
-    fn of_choice<T: Copy>(name: &'static str, all: &[T], variant: fn(T) -> (&'static str, u32, &'static str)) -> Self {
+    fn from_choice<T: Copy>(name: &'static str, all: &[T], variant: fn(T) -> (&'static str, u32, &'static str)) -> Self {
         Self { name, variants: all.iter().map(|&v| variant(v)).collect() }
     }
 }
@@ -21,11 +21,11 @@ impl Declaration {
 pub(super) fn declarations() -> Vec<Declaration> {
     let mut all = numbered();
     all.extend([
-        Declaration::of_choice("pixel_filter", &PixelFilter::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("sequence", &Sequence::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("pattern", &Resolution::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("tone_map", &ToneMap::ALL, |v| (v.glsl_name(), v as u32, v.help())),
-        Declaration::of_choice("shown", &DisplayMode::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("pixel_filter", &PixelFilter::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("sequence", &Sequence::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("pattern", &Resolution::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("tone_map", &ToneMap::ALL, |v| (v.glsl_name(), v as u32, v.help())),
+        Declaration::from_choice("shown", &DisplayMode::ALL, |v| (v.glsl_name(), v as u32, v.help())),
     ]);
     all
 }
@@ -98,13 +98,11 @@ enumerations! {
     /// The meaning of a texture's values, which decides how mip levels average them. All levels
     /// hold linear values: a texture that is used in two ways has two sets of levels.
     pub enum Texels in "texels" {
-        /// Linear data. The mean of a normal map's vectors is shorter the more they differ; shaders
-        /// normalize it.
+        /// Linear data. The mean of normals is shorter the more they differ; shaders normalize it.
         Linear = 0, "TEXELS_LINEAR";
         /// sRGB colours, averaged as linear light.
         Srgb = 1, "TEXELS_SRGB";
-        /// sRGB colours with alpha: levels are premultiplied, so that texels of alpha 0 do not
-        /// contribute.
+        /// sRGB colours with alpha: levels are premultiplied, so texels of alpha 0 add nothing.
         Covered = 2, "TEXELS_COVERED";
     }
 
@@ -112,8 +110,7 @@ enumerations! {
     pub enum View in "view" {
         /// Unit shading normals, world space, on the viewer's side; normal maps included.
         Normals = 1, "VIEW_NORMALS";
-        /// Base colours, linear; for mirrors, glass and conductors the reflectance at normal
-        /// incidence.
+        /// Linear base colours; of mirrors, glass and conductors reflectance at normal incidence.
         Albedo = 2, "VIEW_ALBEDO";
         /// Distance along the ray, scene units.
         Depth = 3, "VIEW_DEPTH";
@@ -299,8 +296,7 @@ impl DisplayMode {
 }
 
 impl PixelFilter {
-    /// Returns true if samples lie within their pixel, so that it sees only what projects into its
-    /// area.
+    /// Returns true if samples lie within their pixel, so that it sees nothing beyond its area.
     pub fn is_within_pixel(self) -> bool {
         matches!(self, Self::Box | Self::Centre)
     }
@@ -312,8 +308,7 @@ mod tests {
 
     use super::*;
 
-    /// What shaders cannot tell apart would be found by no compiler: GLSL's constants are in files
-    /// that are included apart.
+    /// No compiler finds variants that shaders cannot tell apart: their files are included apart.
     #[test]
     fn names_and_numbers_tell_variants_apart() {
         let all = declarations();

@@ -1,5 +1,6 @@
-//! Sets of features that scenes and options require of the path tracer's shaders. Code of a feature that is not in its set is specialized out. A set is
-//! stored in as many 32-bit specialization constants as it needs, and a feature is a `bool` in the shaders.
+//! Sets of features that scenes and options require of the path tracer's shaders. Code of a feature
+//! that is not in its set is specialized out. A set is stored in as many 32-bit specialization
+//! constants as it needs; a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
 use super::path_options::{PATH, PathFeatures};
@@ -112,8 +113,9 @@ const LIGHT_FIRST: u32 = PATH_FIRST + PathFeatures::WORDS as u32;
 
 feature_set! {
     /// The reflection models of a scene's materials.
-    BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines `name_setup`, `name_eval`, `name_diffuse`, `name_sample`,
-    /// `name_has_smooth_part` and `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). The functions that dispatch to them are generated from this list ([`super::glsl`]).
+    BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines
+    /// functions `name_setup`, `name_eval` and so on, as shaders/bsdf/bsdf.glsl describes them.
+    /// The functions that dispatch to them are generated from this list ([`super::glsl`]).
     BsdfModel: "bsdf_models", from BSDF_FIRST, full true, indexed false, BSDF;
     Gltf = "HAS_GLTF", "metallic-roughness";
     Diffuse = "HAS_DIFFUSE", "Lambert";
@@ -164,8 +166,11 @@ feature_set! {
 
 feature_set! {
     /// The kinds of lights that paths sample.
-    LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
-    /// what they do). What calls them is made of this list ([`super::glsl`]). The first five are of surfaces and the environment; the others are those of `src/scene/lights`. [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
+    LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines
+    /// `name_sample` and `name_pdf`, as shaders/lights/light.glsl describes them. The functions
+    /// that dispatch to them are generated from this list ([`super::glsl`]): first surfaces and
+    /// the environment, then the kinds of `src/scene/lights`. Its number is the record's
+    /// [`kind`](super::records::lights::LightRecord::kind).
     LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
     Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
     Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";

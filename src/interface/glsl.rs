@@ -20,12 +20,11 @@ pub fn files() -> Vec<(String, String)> {
     files
 }
 
-/// A compute shader that declares every record, for build.rs to read from its SPIR-V how the compiler lays them out. It includes nothing.
+/// A compute shader that declares every record: build.rs reads their layout from its SPIR-V.
 pub fn check_shader() -> String {
-    let mut text =
-        "#version 460\n#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
-                    layout(local_size_x = 1) in;\n"
-            .to_owned();
+    let mut text = "#version 460\n#extension GL_EXT_buffer_reference : require\n\
+         #extension GL_EXT_buffer_reference_uvec2 : require\nlayout(local_size_x = 1) in;\n"
+        .to_owned();
     records::FILES.iter().for_each(|f| text += &record_file(f));
     for (binding, record) in records::FILES.iter().flat_map(|f| f.records).enumerate() {
         let member = match record.form {
@@ -89,7 +88,7 @@ fn feature_set(set: &features::Declaration) -> String {
     text
 }
 
-/// Generates the numbers of reflection models, and the functions that dispatch to them. Models that no material has are not compiled.
+/// Generates the numbers of reflection models, and functions that dispatch to those in use.
 fn bsdf_dispatch() -> String {
     // HAS_NAME
     let names: Vec<_> = features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
@@ -115,7 +114,7 @@ fn bsdf_dispatch() -> String {
     text
 }
 
-/// Generates the functions that dispatch to kinds of lights. Kinds that no light has are not compiled, and if all lights are of one kind, there is no branch.
+/// Generates the functions that dispatch to kinds of lights in use; one alone needs no branch.
 fn light_dispatch() -> String {
     let names: Vec<_> = features::LIGHTS
         .features
@@ -190,8 +189,8 @@ fn record(record: &Record) -> String {
     text
 }
 
-/// Declares a function that loads a record of an array by pairs of words: a CPU driver gathers 64 bits at the cost of 32, and what is not used is not loaded. For records without others in
-/// them.
+/// Declares a function that loads a record of an array by pairs of words, if it contains no other:
+/// a CPU driver gathers 64 bits at the cost of 32, and unused ones are not loaded.
 fn load(record: &Record) -> Option<String> {
     let Form::Array { align, access: "readonly", .. } = record.form else { return None };
     if align < 8 || !record.size.is_multiple_of(8) {
@@ -240,8 +239,8 @@ fn member(field: &Field) -> String {
     format!("    {kind} {}{counts};  //{}\n", field.name, field.doc.concat())
 }
 
-/// Generates macros for the words of a field, one for each element of an array, numbered. Macros of more than two words, or of two words in different pairs,
-/// take the constructor of their vector as a parameter.
+/// Generates macros for the words of a field, one for each element of an array, numbered. Macros of
+/// over two words, or of two in different pairs, are given their vector's constructor.
 fn word_macros(record: &str, field: &Field) -> String {
     let elements: usize = field.counts.iter().product();
     let words = field.size / 4 / elements;

@@ -1,14 +1,16 @@
-//! Declares records: memory that the CPU writes and shaders read, or vice versa. From one declaration `records!` generates the `#[repr(C)]` struct, its
-//! documentation, and a table of its fields; [`super::glsl`] generates the GLSL declaration from the table, and build.rs compares its layout in SPIR-V with
-//! the table ([`mismatches`]).
+//! Declares records: memory that the CPU writes and shaders read, or vice versa. From one
+//! declaration `records!` generates the `#[repr(C)]` struct, its documentation, and a table of its
+//! fields; [`super::glsl`] generates the GLSL declaration from the table, and build.rs compares its
+//! layout in SPIR-V with the table ([`mismatches`]).
 //!
-//! Types are GLSL's: `float`, `int`, `uint`, `vec2` to `vec4`, `uvec2` to `uvec4`, other records, and arrays of these. Besides there are `address`, of
-//! device memory (`u64`; a `uvec2` in shaders, which need no 64-bit integers then), and `bytes8` (`[u8; 8]`; a `uvec2`).
+//! Types are GLSL's: `float`, `int`, `uint`, `vec2` to `vec4`, `uvec2` to `uvec4`, other records,
+//! and arrays of these. Besides there are `address`, of device memory (`u64`; a `uvec2` in shaders,
+//! which need no 64-bit integers then), and `bytes8` (`[u8; 8]`; a `uvec2`).
 
 /// A file of records, which shaders include as `interface/NAME.glsl`.
 #[derive(Debug)]
 pub struct File {
-    /// Its name.
+    /// Name of the file, without its ending.
     pub name: &'static str,
     /// Other such files whose records it uses.
     pub includes: &'static [&'static str],
@@ -21,9 +23,9 @@ pub struct File {
 /// A constant that Rust and GLSL share.
 #[derive(Debug)]
 pub struct Value {
-    /// Its name on both sides.
+    /// Name on both sides.
     pub name: &'static str,
-    /// Its value.
+    /// The number, in GLSL's type.
     pub number: Number,
     /// Documentation, in lines.
     pub doc: &'static [&'static str],
@@ -42,13 +44,13 @@ pub enum Number {
 /// A record.
 #[derive(Debug)]
 pub struct Record {
-    /// Its name on both sides.
+    /// Name on both sides.
     pub name: &'static str,
     /// How shaders access it.
     pub form: Form,
     /// Bytes on the CPU's side.
     pub size: usize,
-    /// Its fields, in order.
+    /// Fields, in order.
     pub fields: &'static [Field],
     /// Documentation, in lines.
     pub doc: &'static [&'static str],
@@ -57,9 +59,9 @@ pub struct Record {
 /// A field of a record.
 #[derive(Debug)]
 pub struct Field {
-    /// Its name on both sides.
+    /// Name on both sides.
     pub name: &'static str,
-    /// Its type, or that of an array's elements.
+    /// Type of the field, or of an array's elements.
     pub kind: &'static str,
     /// Lengths of an array's dimensions, the outer one first; empty: it is no array.
     pub counts: &'static [usize],
@@ -94,15 +96,15 @@ pub enum Form {
     },
     /// The push constants, as `push`.
     Push,
-    /// Pairs of 32-bit words, loaded by hand-written code into `w0`, `w1`, ...: macros name the fields. For records that may be of several kinds, or whose
-    /// layout is not GLSL's.
+    /// Pairs of 32-bit words, loaded by hand-written code into `w0`, `w1`, ...: macros name the
+    /// fields. For records of several kinds, or whose layout is not GLSL's.
     Words,
 }
 
 /// A record as the shader compiler laid it out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reflected {
-    /// Its name.
+    /// Name of the record.
     pub name: String,
     /// Name, offset and size of each member, bytes.
     pub members: Vec<(String, usize, usize)>,
@@ -110,7 +112,7 @@ pub struct Reflected {
     pub stride: Option<usize>,
 }
 
-/// Finds records whose layout in SPIR-V differs from that in Rust, and describes the first such field of each.
+/// Describes for each record the first field whose layout in SPIR-V differs from that in Rust.
 pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: &[Reflected]) -> Vec<String> {
     let mut out = Vec::new();
     for record in records.into_iter().filter(|r| r.form != Form::Words) {
@@ -168,8 +170,8 @@ pub mod types {
     pub type bytes8 = [u8; 8];
 }
 
-/// Declares the records of a file: its name, the files that it includes, constants, and for each record
-/// its [`Form`] and its fields.
+/// Declares the records of a file: its name, the files that it includes, constants, and for each
+/// record its [`Form`] and its fields.
 macro_rules! records {
     // the type of a field: no array, or one of one or two dimensions
     (@type $kind:ident) => {

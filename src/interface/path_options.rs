@@ -1,5 +1,4 @@
-//! The options of paths that are numbers in shaders, and the features that options and lights
-//! require of the shaders of paths.
+//! The options of paths that are numbers in shaders, and the features that paths require.
 
 use super::constants::Constant;
 use super::features::{Declaration, PATH_FIRST, feature_set};

@@ -31,6 +31,13 @@ pub struct Channel {
     pub samples: Samples,
 }
 
+impl Channel {
+    /// A channel of floats.
+    pub fn from_floats(name: impl Into<String>, samples: Vec<f32>) -> Self {
+        Self { name: name.into(), samples: Samples::F32(samples) }
+    }
+}
+
 /// An image with named channels, linear values, and text metadata on how it was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {

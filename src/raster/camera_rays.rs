@@ -42,7 +42,7 @@ impl CameraRays {
         }
     }
 
-    /// Records the rays of a launch. The stream's parameters must be those of the view that was drawn last.
+    /// Records the rays of a launch. The stream's parameters must be those of the last view drawn.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         match self {
             Self::Traced(stream) => stream.record(recorder, push),

@@ -11,10 +11,10 @@ use crate::film::camera::CameraRecord;
 const MARGIN: f64 = 1.0;
 /// Relative rounding of clip coordinates: 32 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
-/// Relative widening of a box: spheres are drawn in boxes that are a little larger than they (shaders/raster/sphere.vert).
+/// Relative widening of the boxes that spheres are drawn in (shaders/raster/sphere.vert).
 const WIDENED: f64 = 2e-3;
-/// Near plane of a perspective view, relative to the farthest depth in it. Depth is reversed and floating, so it
-/// costs no precision; what is nearer, single precision does not tell from the eye.
+/// Near plane of a perspective view, relative to the farthest depth in it. Depth is reversed and
+/// floating, so it costs no precision; single precision does not tell nearer points from the eye.
 const NEAR: f64 = 1e-9;
 
 /// An image, or a block of one, seen through a camera.
@@ -26,8 +26,8 @@ pub struct View {
     pub image_size: [u32; 2],
     /// The rendered block of the image.
     pub block: Block,
-    /// Where in its pixel each ray passes, pixels from the upper left corner; the centre is `[0.5, 0.5]`. The rays of the stream that
-    /// uses what is drawn must pass there.
+    /// Position in its pixel of each ray, from the upper left corner; the centre is `[0.5, 0.5]`.
+    /// The rays of the stream that uses the picture must pass there.
     pub at: [f32; 2],
 }
 
@@ -114,7 +114,7 @@ impl Frustum {
         let side = |axis: DVec3, k: usize, sign: f64| {
             let (image, block) = (view.image_size[k] as f64, view.block.size[k] as f64);
             let scale = sign * image / (view.camera.view[k] as f64 * block);
-            // pixels are sampled at their centre: the image is moved so that it is `at` that lies there
+            // pixels are sampled at their centre: the image is moved so that `at` lies there
             let moved = (image - 2.0 * view.block.origin[k] as f64 + 1.0 - 2.0 * view.at[k] as f64) / block - 1.0;
             Plane { normal: axis * scale, offset: 0.0 }.plus(w, moved)
         };
@@ -156,8 +156,8 @@ impl Frustum {
         self.depth.range(bounds, to_world, self.eye.as_dvec3())
     }
 
-    /// Rows of the matrix from positions relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
-    /// is seen; clip space is `wide` times as large as the image.
+    /// Rows of the matrix from positions relative to the eye to clip space, whose depth is greatest
+    /// in front. `depth` is the visible range; clip space is `wide` times as large as the image.
     pub fn clip(&self, depth: [f64; 2], wide: f64) -> [[f32; 4]; 4] {
         let [clip_near, clip_far] = self.clip_planes;
         let z = if self.orthographic {
@@ -182,7 +182,7 @@ impl Frustum {
         (NEAR * depth[1]).max(1e-30)
     }
 
-    /// Depth in clip space of what is not clipped by depth, unless it is behind the camera; `depth` as for [`Frustum::clip`].
+    /// Depth in clip space of points in front of the camera; `depth` as for [`Frustum::clip`].
     pub fn box_depth(&self, depth: [f64; 2]) -> f32 {
         if self.orthographic { 0.5 } else { self.nearest(depth) as f32 }
     }

@@ -1,9 +1,9 @@
 //! Rasterized primary visibility: hits of camera rays, one ray per pixel.
 //!
-//! Geometry is rasterized into a visibility buffer (one primitive id per pixel), and a compute shader intersects each ray with that one
-//! primitive and calls the stream's shader (`shaders/trace/visibility.glsl`). So a pass's shader is the same, and gets the same hits, as
-//! when its rays are traced; only where a ray passes an edge within the sub-pixel precision of the rasterizer may the
-//! neighbouring primitive be hit instead.
+//! Geometry is rasterized into a visibility buffer (one primitive id per pixel), and a compute
+//! shader intersects each ray with that one primitive and calls the stream's shader
+//! (`shaders/trace/visibility.glsl`). So the shader and its hits are those of traced rays; only at
+//! an edge within the rasterizer's precision may the neighbouring primitive be hit instead.
 
 mod camera_rays;
 mod frustum;
@@ -47,9 +47,9 @@ choices! {
     }
 }
 
-/// Maximum number of instanced primitives per pixel at which rasterizing costs less than tracing: on CPU devices, and on others. Mesa's CPU driver takes 90 to
-/// 240 ns for a triangle, however small; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
-/// (`benches/studies/primary.rs`). It was not measured on GPUs.
+/// Maximum instanced primitives per pixel at which rasterizing costs less than tracing: on CPU
+/// devices, and on others (not measured). Mesa's CPU driver takes 90 to 240 ns for a triangle; at
+/// 0.43 a pixel both cost the same, at 0.28 it saves a third (`benches/studies/primary.rs`).
 const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
 
 impl Primary {
@@ -90,6 +90,9 @@ pub struct Raster {
     stream: Stream,
 }
 
+/// The vertices that draw a range of primitives.
+type Vertices<'a> = &'a dyn Fn(Range<u32>) -> Range<u32>;
+
 /// Consecutive primitives of a TLAS instance.
 struct Draw {
     push: Push,
@@ -105,11 +108,11 @@ struct Draws {
 }
 
 impl Raster {
-    /// Compiles the shaders for a scene and a stream of camera rays, and allocates for blocks of up to `size` pixels.
+    /// Compiles the shaders for a scene and a stream of camera rays, for blocks up to `size`.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when the device cannot rasterize, or not at this size; [`crate::Error::Usage`] for a stream whose rays are
-    /// not the camera's; [`crate::Error::OutOfMemory`].
+    /// [`crate::Error::Device`] when the device cannot rasterize, or not at this size;
+    /// [`crate::Error::Usage`] for a stream of other rays; [`crate::Error::OutOfMemory`].
     pub fn new(tracer: &Tracer, shaders: &'static StreamShaders, size: [u32; 2]) -> Result<Self> {
         let (device, features) = (tracer.device(), tracer.features());
         let targets = Targets::new(device, size)?;
@@ -128,17 +131,14 @@ impl Raster {
         })
     }
 
-    /// Records both [`Raster::draw`] and [`Raster::trace`].
-    ///
-    /// # Errors
-    /// Those of [`Raster::draw`].
+    /// Records both [`Raster::draw`], whose errors it has, and [`Raster::trace`].
     pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<DrawStats> {
         let stats = self.draw(recorder, tracer, view)?;
         self.trace(recorder, push);
         Ok(stats)
     }
 
-    /// Records the drawing of a view of the scene as it is now, timed as "raster draw". What was drawn before is replaced.
+    /// Records the drawing of a view, timed as "raster draw", in place of the last one.
     ///
     /// # Errors
     /// [`crate::Error::Scene`] when the camera's transform is flat.
@@ -161,11 +161,13 @@ impl Raster {
         recorder.barrier();
         recorder.update(&self.params, &params);
         recorder.barrier();
+
+        // Opaque triangles first: they hide most of the rest.
         recorder.timed("raster draw", |r| {
             r.draw_into(&self.targets, size, |d| {
                 let triangles = |n: Range<u32>| 3 * n.start..3 * n.end;
                 let boxes = |n: Range<u32>| BOX_VERTICES * n.start..BOX_VERTICES * n.end;
-                let mut all = |pipeline: &GraphicsPipeline, draws: &[Draw], vertices: &dyn Fn(Range<u32>) -> Range<u32>| {
+                let mut all = |pipeline: &GraphicsPipeline, draws: &[Draw], vertices: Vertices| {
                     if !draws.is_empty() {
                         d.bind(pipeline);
                     }
@@ -178,14 +180,11 @@ impl Raster {
                     }
                 };
                 all(&self.triangles, &draws.triangles, &triangles);
-                // opaque triangles first: they hide most of the rest
-                for (pipeline, draws, vertices) in [
-                    (&self.spheres, &draws.spheres, &boxes as &dyn Fn(Range<u32>) -> Range<u32>),
-                    (&self.alpha_tested, &draws.alpha_tested, &triangles),
-                ] {
-                    if let Some(pipeline) = pipeline {
-                        all(pipeline, draws, vertices);
-                    }
+                if let Some(pipeline) = &self.spheres {
+                    all(pipeline, &draws.spheres, &boxes);
+                }
+                if let Some(pipeline) = &self.alpha_tested {
+                    all(pipeline, &draws.alpha_tested, &triangles);
                 }
             });
             r.copy_ids(&self.targets, size, &self.ids);
@@ -194,8 +193,9 @@ impl Raster {
         Ok(stats)
     }
 
-    /// Records the stream's rays `push.first .. push.first + push.count` through the pixels of the block that was drawn last, timed under
-    /// the name of their pass. The stream's parameters must be [`BlockParams`] of the same block and camera, and `push.sample_bits` 0.
+    /// Records the stream's rays `push.first .. push.first + push.count` through the pixels of the
+    /// last block drawn, timed under the name of their pass. The stream's parameters must be
+    /// [`BlockParams`] of the same block and camera, and `push.sample_bits` 0.
     pub fn trace(&self, recorder: &mut Recorder, push: &Push) {
         debug_assert!(push.sample_bits == 0, "one ray a pixel");
         self.stream.record(recorder, &Push { rays: self.ids.address(), ..*push });
@@ -238,6 +238,8 @@ impl Raster {
             first: entry.entry,
             ..Default::default()
         };
+
+        // Ranges that meet are one draw; triangles are divided into opaque and alpha-tested ones.
         let shape = entry.shape;
         let mut add = |range: Range<u32>| {
             let push_range = |to: &mut Vec<Draw>, range: Range<u32>| match to.last_mut() {
@@ -254,6 +256,8 @@ impl Raster {
                 push_range(&mut draws.alpha_tested, range.start.max(shape.opaque)..range.end);
             }
         };
+
+        // Of an instance that the frustum cuts, only the chunks that may be visible.
         if overlap == FrustumTest::Inside || shape.chunks.is_empty() {
             return add(0..shape.primitives);
         }

@@ -5,8 +5,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use crate::film::camera::CameraRecord;
 use crate::tracer::transform::rows;
 
-/// Returns true if a camera has turned, moved or zoomed by more than a camera in motion does from
-/// frame to frame: by an eighth of the view, or of the length of occlusion rays.
+/// Returns true if a camera moved by an eighth of the view, or of the reach of occlusion rays.
 pub fn is_jump(before: &CameraRecord, now: &CameraRecord, reach: f64) -> bool {
     const PART: f64 = 0.125;
     let change = |column: usize| {

@@ -1,4 +1,4 @@
-//! What frames display: a buffer of theirs, and how it becomes 8-bit colours.
+//! The display of frames: a buffer of theirs, and how it becomes 8-bit colours.
 
 pub use crate::interface::DisplayMode;
 use crate::interface::ToneMap;

@@ -7,8 +7,7 @@ use super::settings::Settings;
 /// frame's place in all pixels, so more of them leave edges jagged.
 const FIRST_LONG: u32 = 4;
 
-/// A long frame after others has at most a part of so many of all samples at rest: who watches sees
-/// the image change as often as it changes visibly.
+/// A long frame has at most one in this many of all samples at rest: viewers see every change.
 const PARTS: u32 = 8;
 
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames
@@ -38,16 +37,14 @@ pub struct FrameSamples {
 }
 
 impl FrameSamples {
-    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames
-    /// at rest all sample the same pattern, and so have the same number. `is_cpu`: the device is a
-    /// processor, as opposed to a GPU.
-    pub fn of_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
+    /// Samples of radiance in images of so many pixels. `period` is left to the paths, whose frames
+    /// at rest all sample the same pattern, and so have the same number.
+    pub fn for_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
         // a tenth of a frame's time is then for other things
         const FIRST_PER_PIXEL: u64 = 8;
         // a fortieth
         const MAX_PER_PIXEL: u64 = 32;
-        // the first long frames take about a second on two cores, and a tenth of that on a GPU that
-        // traces 160 times as many
+        // the first long frames take about a second on two cores, and a tenth of that on a GPU
         const FIRST_PATHS: u64 = 1 << 20;
         const FIRST_GPU_PATHS: u64 = 1 << 24;
         const GROWTH: u64 = 4;
@@ -58,18 +55,18 @@ impl FrameSamples {
         let grows = settings.converges() && settings.resolution.period() == 1;
         // several paths of a short frame after the first at rest lie anywhere in their pixels
         let forgets_short = many >= 4 && (few == 1 || grows);
-        let (ramp, first_long) = match forgets_short && grows {
-            true => ((many / few.next_power_of_two().max(2)).checked_ilog2().unwrap_or(0), 1),
-            false => (0, FIRST_LONG),
+        let (ramp, first_long) = if forgets_short && grows {
+            ((many / few.next_power_of_two().max(2)).checked_ilog2().unwrap_or(0), 1)
+        } else {
+            (0, FIRST_LONG)
         };
         let times = per_pixel(GROWTH * most_paths, MAX_PER_PIXEL) / many;
         let doublings = if grows { times.checked_ilog2().unwrap_or(0) } else { 0 };
         Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
     }
 
-    /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight
-    /// samples of a pixel on.
-    pub fn of_visibility(settings: &Settings, pixels: u64) -> Self {
+    /// Samples of ambient visibility; long frames take eight or more of a pixel, as stills do.
+    pub fn for_visibility(settings: &Settings, pixels: u64) -> Self {
         // half a second on two cores, where that is enough for eight; in large images seconds
         const MAX_PER_PIXEL: u64 = 16;
         const MANY_SAMPLES: u64 = 1 << 22;
@@ -126,8 +123,7 @@ impl FrameSamples {
         // all that have fewer have as many together as one
         let frames = frames - self.ramp;
         let doublings = self.doublings_before(frames);
-        // 2 PARTS frames have as many together as PARTS of the next number, and all that follow
-        // likewise
+        // 2 PARTS frames have as many together as PARTS of the next number, and so on
         (u64::from(self.many) * u64::from(frames - PARTS * doublings)) << doublings
     }
 
@@ -159,8 +155,7 @@ impl FrameSamples {
         self.forgets_short && self.is_long(resting)
     }
 
-    /// Mean number of samples of a pixel that count in all frames since the image came to rest, but
-    /// for the first; rounded down.
+    /// Mean number of samples of a pixel at rest but for the first frame's; rounded down.
     pub fn since_rest(&self, resting: u32) -> u64 {
         let short = resting.min(self.first_long - 1);
         if self.has_forgotten_short(resting) {
@@ -202,8 +197,8 @@ mod tests {
         for pixels in [1, 14_400, 518_400, 10_000_000] {
             for settings in [Preset::Fast, Preset::Quality].map(Preset::settings) {
                 let all = |settings: &Settings| {
-                    let of_radiance = [true, false].map(|is_cpu| FrameSamples::of_radiance(settings, pixels, is_cpu));
-                    of_radiance.into_iter().chain([FrameSamples::of_visibility(settings, pixels)])
+                    let for_radiance = [true, false].map(|is_cpu| FrameSamples::for_radiance(settings, pixels, is_cpu));
+                    for_radiance.into_iter().chain([FrameSamples::for_visibility(settings, pixels)])
                 };
                 let settings = Settings { converge: true, ..settings };
                 for samples in all(&settings) {
@@ -215,8 +210,7 @@ mod tests {
                         let now = samples.in_frame(resting);
                         if samples.is_long(resting) {
                             assert_eq!(samples.in_long_before(resting), in_long);
-                            // a block of the sequence, and a small part of all, or as few as at
-                            // first
+                            // a block of the sequence, and a small part of all, or as few as first
                             assert!(in_long.is_multiple_of(now), "{samples:?}");
                             let is_part = if now <= samples.many {
                                 in_long == 0 || now <= in_long.max(samples.few)
@@ -244,27 +238,27 @@ mod tests {
     #[test]
     fn frames_at_rest_become_longer() {
         let settings = Settings { converge: true, ..Preset::Balanced.settings() };
-        let samples = FrameSamples::of_radiance(&settings, 14_400, true);
+        let samples = FrameSamples::for_radiance(&settings, 14_400, true);
         assert_eq!(
             [0, 1, 2, 3, 4, 18, 19, 26, 27, 1000].map(|resting| samples.in_frame(resting)),
             [1, 2, 2, 4, 8, 8, 16, 16, 32, 32]
         );
         assert_eq!([samples.frames_for_first(10), samples.frames_for_first(64)], [12, 34]);
         let quality = Settings { converge: true, ..Preset::Quality.settings() };
-        let quality = FrameSamples::of_radiance(&quality, 14_400, true);
+        let quality = FrameSamples::for_radiance(&quality, 14_400, true);
         assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.in_frame(resting)), [4, 4, 4, 8, 8, 32]);
         // a GPU has time for several paths in a large image
-        let large = |is_cpu| FrameSamples::of_radiance(&settings, 1920 * 1080, is_cpu);
+        let large = |is_cpu| FrameSamples::for_radiance(&settings, 1920 * 1080, is_cpu);
         assert_eq!([large(true).in_frame(4), large(false).in_frame(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
         // all pixels of a pattern have the same number
-        let half = FrameSamples::of_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
+        let half = FrameSamples::for_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
         assert_eq!([3, 4, 100].map(|resting| half.in_frame(resting)), [1, 8, 8]);
     }
 
     #[test]
     fn long_frames_sample_all_pixels_of_a_pattern() {
         let half = Settings { converge: true, resolution: Resolution::Half, ..Preset::Fast.settings() };
-        let samples = FrameSamples::of_visibility(&half, 14_400);
+        let samples = FrameSamples::for_visibility(&half, 14_400);
         let short = samples.first_long - 1;
         assert_eq!(samples.since_rest(short + 2), u64::from(short / samples.period + 2 * samples.most()));
         for wanted in 1..100 {

@@ -152,11 +152,12 @@ impl FrameSettings {
         self.animate.as_deref().or(self.time.map(|_| "0"))
     }
 
-    /// The settings of the pipeline: the preset's, with the settings given, for ambient occlusion with settings `ao`.
+    /// The settings of the pipeline: the preset's, with those given, and `ao`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for what has no effect together.
+    /// [`Error::Usage`] for settings without effect together.
     pub fn settings(&self, ao: &AoSettings, seed: u32) -> Result<Settings> {
+        // Larsen's pipeline is a preset as a whole.
         let mut s = self.preset.unwrap_or_default().settings();
         let technique = self.technique.unwrap_or(s.technique);
         if technique == Technique::Larsen && s.technique != Technique::Larsen {
@@ -178,6 +179,8 @@ impl FrameSettings {
                 )));
             }
         }
+
+        // Settings that are given replace those of the preset.
         s.technique = technique;
         s.primary = match self.primary.unwrap_or_default() {
             PrimaryChoice::Auto => None,

@@ -1,6 +1,5 @@
-//! The frame graph: passes declare which resources they read and write. From these declarations
-//! follow memory allocation, barriers, timings, and which passes are skipped because no input has
-//! changed.
+//! The frame graph: passes declare which resources they read and write. From that follow memory,
+//! barriers, timings, and which passes are skipped because no input has changed.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -34,7 +33,7 @@ pub struct Frame<'a> {
     pub camera: CameraRecord,
     /// Objects that moved since the previous frame.
     pub moved: &'a [MovedRecord],
-    /// What the frame does.
+    /// The plan of the frame.
     pub plan: &'a FramePlan,
     /// From the space of the previous frame's camera to that of this one's, three rows.
     pub previous_to_camera: [[f32; 4]; 3],
@@ -59,8 +58,7 @@ impl Range {
         vec![Self { first: 0, count }]
     }
 
-    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a
-    /// group).
+    /// Splits rays into launches of whole groups of `group` rays, of at most `most` or a group.
     pub fn launches(rays: u32, group: u32, most: u32) -> Vec<Self> {
         let most = (most / group).max(1) * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
@@ -137,8 +135,7 @@ enum Frames {
     Long,
 }
 
-/// Passes that are recorded one after another for each of several ranges; mostly one pass and one
-/// range.
+/// Passes that are recorded one after another for each of several ranges.
 pub struct Stage {
     passes: Vec<Box<dyn Pass>>,
     ranges: Vec<Range>,
@@ -154,12 +151,12 @@ impl Stage {
     }
 
     /// Has the stage run in long frames alone ([`super::frame_samples`]).
-    pub fn of_long_frames(self) -> Self {
+    pub fn in_long_frames(self) -> Self {
         Self { frames: Frames::Long, ..self }
     }
 
     /// Has the stage run in all frames but long ones.
-    pub fn of_short_frames(self) -> Self {
+    pub fn in_short_frames(self) -> Self {
         Self { frames: Frames::Short, ..self }
     }
 
@@ -189,10 +186,9 @@ impl Graph {
     pub fn new(device: &Arc<Device>, extent: Extent, stages: Vec<Stage>) -> Result<Self> {
         let mut resources = Resources::new(extent);
         resources.allocate(device, &stages.iter().map(Stage::uses).collect::<Vec<_>>())?;
-        let ray_count = match resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none()) {
-            true => Some(Buffer::new(device, "number of rays for the host", 4, Memory::Readback)?),
-            false => None,
-        };
+        let needs_copy = resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none());
+        let ray_count = || Buffer::new(device, "number of rays for the host", 4, Memory::Readback);
+        let ray_count = needs_copy.then(ray_count).transpose()?;
         Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count, unfinished: Vec::new() })
     }
 
@@ -216,8 +212,7 @@ impl Graph {
         Ok(false)
     }
 
-    /// Rays of the last frame, as the device counted them, or of passes whose number of rays the
-    /// host knows.
+    /// Rays of the last frame, as the device or the host counted them.
     ///
     /// # Errors
     /// Those of the device.
@@ -228,8 +223,7 @@ impl Graph {
         Ok(self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum())
     }
 
-    /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that
-    /// moved.
+    /// Moves the lights to where they are in `scene`. Returns true if any have moved.
     ///
     /// # Errors
     /// Those of the passes ([`Pass::move_lights`]).
@@ -282,15 +276,13 @@ impl Graph {
         recorded
     }
 
-    /// Forgets which stages have run, after a frame that was not finished: the next frame records
-    /// all of them.
+    /// Has the next frame record all stages, because a frame was not finished.
     pub fn invalidate(&mut self) {
         self.stages.iter_mut().for_each(|s| s.versions.clear());
     }
 
-    /// After a frame that was not finished: double-buffered resources are those of the frame before
-    /// again. What passes add to in place ([`Resource::Rest`], [`Resource::RestParts`]) is in
-    /// pieces.
+    /// Takes an unfinished frame back: double-buffered resources are the frame before's again.
+    /// The contents of [`Resource::Rest`] and [`Resource::RestParts`] are lost.
     pub fn take_back(&mut self) {
         for resource in self.unfinished.drain(..) {
             self.resources.swap(resource);
@@ -387,7 +379,7 @@ fn record_range(
     if range == 0 {
         for (resource, word) in enabled().flat_map(|p| p.uses(display).clears) {
             if let Some(buffer) = resources.buffer(resource) {
-                hazards.before(r, &[], &[resources.buffer_index(resource)]);
+                hazards.separate(r, &[], &[resources.buffer_index(resource)]);
                 r.fill(buffer, buffer.size(), word);
             }
         }
@@ -397,7 +389,7 @@ fn record_range(
         let reads: Vec<_> = uses.reads.iter().map(|u| resources.buffer_index(*u)).collect();
         let previous: Vec<_> = uses.previous.iter().map(|u| resources.previous_index(*u)).collect();
         let writes: Vec<_> = uses.writes.iter().map(|u| resources.buffer_index(*u)).collect();
-        hazards.before(r, &[reads, previous].concat(), &writes);
+        hazards.separate(r, &[reads, previous].concat(), &writes);
         pass.record(r, frame, resources, stage.ranges[range])?;
     }
     Ok(())
@@ -411,9 +403,8 @@ struct Hazards {
 }
 
 impl Hazards {
-    /// Records a barrier if what follows reads a written buffer, or writes a read or written one;
-    /// then notes what follows.
-    fn before(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
+    /// Records a barrier if a use conflicts with those since the last one; then notes the use.
+    fn separate(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
         if self.conflicts(reads, writes) {
             r.barrier();
             *self = Self::default();

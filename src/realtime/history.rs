@@ -1,4 +1,4 @@
-//! What frames leave behind for those after them.
+//! State that frames leave behind for those after them.
 
 use glam::DMat3;
 
@@ -31,21 +31,19 @@ impl Motion {
     }
 }
 
-/// Which paths the frames take of the sequence of each pixel. A pixel takes them one after the
-/// other, also where it is sampled in every second or fourth frame only: all samples of a sequence
-/// are more even than every fourth of them.
+/// The paths that frames take of the sequence of each pixel: one after the other, also where it is
+/// sampled in every fourth frame only, because all samples of a sequence are more even.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PathSequence {
     /// Index of the next path.
     pub first: u32,
     /// The paths since the image came to rest are a block of the sequence, from its beginning.
     pub in_block: bool,
-    /// Maximum number of paths of a pixel since then. The other pixels of the pattern follow with
-    /// paths of the same indices.
+    /// Maximum number of paths of a pixel since then, which other pixels of the pattern follow.
     pub of_pattern: u32,
 }
 
-/// What the next frame depends on of those before it, on the host.
+/// Host state of earlier frames that the next one depends on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     /// Number of the next frame, by which samples are chosen.
@@ -70,7 +68,7 @@ pub struct History {
     pub environment_turn: Option<DMat3>,
     /// A frame was interrupted: the samples at rest are in pieces and start anew.
     pub was_interrupted: bool,
-    /// What the last frame displayed; `None`: there was none.
+    /// Display of the last frame; `None`: there was none.
     pub shown: Option<Option<Display>>,
 }
 

@@ -61,8 +61,7 @@ use signals::larsen::Larsen;
 use signals::radiance::Radiance;
 use signals::visibility::AmbientVisibility;
 
-/// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as
-/// another surface.
+/// Distance from a tangent plane, in pixel footprints, from which neighbours are other surfaces.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals below which a neighbour counts as another surface.
 const NORMAL_TOLERANCE: f32 = 0.9;
@@ -77,17 +76,14 @@ pub struct FrameStats {
     pub primary_rays: u64,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
-    /// Occlusion rays of sampled pixels that were not traced: background, or a full history while
-    /// nothing moves.
+    /// Occlusion rays of sampled pixels not traced: background, or a full history at rest.
     pub skipped_rays: u64,
-    /// BVH nodes that the frame's camera rays visit; `None` unless they are displayed
-    /// ([`DisplayMode::Nodes`]).
+    /// BVH nodes that camera rays visit, if they are displayed ([`DisplayMode::Nodes`]).
     pub nodes: Option<NodeVisits>,
 }
 
 impl FrameStats {
-    /// Device seconds of the passes that trace rays, by which the quality of refitted hierarchies
-    /// is judged ([`Tracer::traced`]).
+    /// Device seconds of passes that trace rays, by which hierarchies are judged.
     pub fn tracing_seconds(&self) -> f64 {
         self.timings.iter().filter(|t| t.label.ends_with(" trace") || t.label == "gbuffer").map(|t| t.seconds).sum()
     }
@@ -133,8 +129,7 @@ impl DisplayPassKind {
 const SURFACES_STAGE: usize = 0;
 
 /// Share of the surfaces in view that the previous image has shown, below which a frame begins
-/// anew: the first frame of an image has its samples where they say most, and those of a frame that
-/// goes on with histories of few pixels are worse in all others.
+/// anew: first frames have their samples where they say most.
 const MIN_KNOWN: f64 = 1.0 / 3.0;
 
 /// Pixels by which that share is known.
@@ -147,11 +142,10 @@ impl Realtime {
     }
 
     /// Creates the pipeline for images of `size` pixels of the tracer's scene. `lights` are the
-    /// positions of the scene's point lights relative to its origin, which Larsen's pipeline needs.
+    /// positions of the scene's point lights relative to its origin, for Larsen's pipeline.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling
-    /// shaders.
+    /// [`Error::Usage`] for wrong settings, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
         let settings = &settings.with_launches_of(&tracer.device().info);
@@ -163,12 +157,11 @@ impl Realtime {
     }
 
     /// Creates the pipeline for frames of radiance. The tracer must have been built from `flat`
-    /// with [`crate::tracer::Needs::shading`]; `options` are those of paths, whose number per pixel
-    /// is [`Settings::rays_per_pixel`].
+    /// with [`crate::tracer::Needs::shading`]; paths have `options`, but their own number per
+    /// pixel.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range or without effect on radiance,
-    /// [`Error::OutOfMemory`], and those of compiling shaders.
+    /// [`Error::Usage`] for wrong settings, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn radiance(
         tracer: &Tracer,
         flat: &FlatScene,
@@ -210,19 +203,16 @@ impl Realtime {
         self.signal.channels()
     }
 
-    /// Notes that lights or materials have changed since the last frame: histories of radiance
-    /// count in the next one as far as its samples do not differ from them, and for eight frames at
-    /// most. Those of ambient visibility do not depend on them.
+    /// Notes that lights or materials have changed: histories of radiance count in the next frame
+    /// as far as its samples do not differ, for eight frames at most.
     pub fn change_light(&mut self) {
         if self.signal.depends_on_light() {
             self.history.change_light();
         }
     }
 
-    /// Turns the environment map from the next frame on, and calls [`Realtime::change_light`]:
-    /// `to_map` is the rotation from world directions to the map's
-    /// ([`crate::scene::EnvironmentMap::to_map`]). No other environment has a direction, and
-    /// ambient visibility depends on none.
+    /// Turns the environment map from the next frame on, which changes light: `to_map` is the
+    /// rotation from world directions to the map's ([`crate::scene::EnvironmentMap::to_map`]).
     pub fn turn_environment(&mut self, to_map: DMat3) {
         if self.signal.depends_on_light() {
             self.history.environment_turn = Some(to_map);
@@ -230,13 +220,11 @@ impl Realtime {
         }
     }
 
-    /// Moves lights, and surfaces that emit light, to where they are in `scene` from the next frame
-    /// on, and calls [`Realtime::change_light`] if any has moved. `scene` is the tracer's in the
-    /// pose to which that was updated. Ambient visibility depends on no light.
+    /// Moves lights and emissive surfaces to where they are in `scene` from the next frame on, and
+    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated.
     ///
     /// # Errors
-    /// Those of the device; [`Error::Scene`] where lights were switched on or off, which needs
-    /// other shaders.
+    /// Those of the device; [`Error::Scene`] where lights were switched, which needs other shaders.
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         if self.graph.move_lights(tracer, scene)? {
             self.change_light();
@@ -254,8 +242,7 @@ impl Realtime {
         &self.settings
     }
 
-    /// Number of frames at rest after which the image no longer changes; `None`: with every frame,
-    /// or it is pixels that come to rest, each on its own.
+    /// Number of frames at rest after which the image no longer changes; `None`: it always does.
     pub fn frames_to_rest(&self) -> Option<u32> {
         self.signal.frames_to_rest(&self.settings, &self.frame_samples)
     }
@@ -267,8 +254,7 @@ impl Realtime {
         signal.frame_samples(settings, signals::pixels(size), is_cpu).frames_for_first(frames).min(frames)
     }
 
-    /// Samples of a pixel that the last frame shows: since the image came to rest, or of the
-    /// longest history.
+    /// Samples of a pixel that the last frame shows: those at rest, or of the longest history.
     pub fn shown_samples(&self) -> u32 {
         let (s, resting) = (&self.settings, self.history.motion.frames_at_rest());
         if s.converges() {
@@ -291,8 +277,7 @@ impl Realtime {
         self.history.reset();
     }
 
-    /// Discards the history as [`Realtime::reset`] does, and restarts the sampler at the first
-    /// frame.
+    /// Discards the history, and restarts the sampler at the first frame.
     pub fn rewind(&mut self) {
         self.start_at(0);
     }
@@ -439,27 +424,23 @@ impl Realtime {
         let (pixels, samples) = (self.pixels(), plan.progress.samples);
         let all = pixels * u64::from(samples) / u64::from(self.signal.period(plan, &self.settings));
         let has_known_hits = self.graph.resources().buffer(Resource::KnownHits).is_some();
+        let shows_nodes = self.display.is_some_and(|d| d.shown == DisplayMode::Nodes);
         Ok(FrameStats {
             timings,
             samples,
             primary_rays: self.signal.camera_rays(plan, &self.settings, pixels, has_known_hits),
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
-            nodes: match self.display.is_some_and(|d| d.shown == DisplayMode::Nodes) {
-                true => Some(NodeVisits::read(self.graph.resources(), pixels)?),
-                false => None,
-            },
+            nodes: shows_nodes.then(|| NodeVisits::read(self.graph.resources(), pixels)).transpose()?,
         })
     }
 
-    /// Sets the buffer that the next frames write to [`Realtime::displayed`], in the same
-    /// submission; `None`: none, at no cost. It may change before every frame: the first call
-    /// compiles the pass, later ones write its parameters. The first one with [`DisplayMode::Rays`]
-    /// discards the history.
+    /// Sets the buffer that the next frames write to [`Realtime::displayed`]; `None`: none. It may
+    /// change before every frame: the first call compiles the pass, later ones write parameters.
+    /// The first one with [`DisplayMode::Rays`] discards the history.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a buffer that these settings do not produce, and those of compiling the
-    /// shader.
+    /// [`Error::Usage`] for a buffer that does not exist, and those of compiling the shader.
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             self.signal.check_display(display.shown, &self.settings)?;

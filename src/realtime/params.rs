@@ -6,8 +6,7 @@ use crate::tracer::MovedBounds;
 /// Maximum number of boxes of moved objects, each of which is tested for every pixel.
 pub const MAX_MOVED: usize = 16;
 
-/// Records of the objects that an update moved: one each for the largest, and one box around the
-/// others.
+/// Records of the moved objects: one each for the largest, and one box around the others.
 pub fn moved_records(moved: &[MovedBounds]) -> Vec<MovedRecord> {
     let mut all: Vec<&MovedBounds> = moved.iter().filter(|m| m.share > 0.0).collect();
     let size = |m: &MovedBounds| m.share * m.bounds.half_area();

@@ -1,4 +1,4 @@
-//! What a frame does, decided before anything of it is recorded.
+//! The plan of a frame, decided before anything of it is recorded.
 
 use glam::DMat3;
 
@@ -11,17 +11,15 @@ use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::raster::Primary;
 
-/// Maximum samples for which a history of radiance counts after lights or materials have changed,
-/// per ray of a frame.
+/// Maximum samples of a history of radiance after a change of light, per ray of a frame.
 const PAST_AFTER_NEW_LIGHT: f32 = 8.0;
 
-/// Minimum number of frames at rest before their mean is denoised: of fewer too little is known of
-/// their noise.
+/// Minimum number of frames at rest before their mean is denoised: their noise must be known.
 const MIN_DENOISED_FRAMES: u32 = 4;
 /// Minimum number of samples of a pixel, likewise.
 const MIN_DENOISED_SAMPLES: u64 = 8;
 
-/// What a frame depends on besides the frames before it.
+/// Inputs of a frame besides the frames before it.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a> {
     /// Signal of the frames.
@@ -51,8 +49,7 @@ pub struct RestProgress {
     pub is_long: bool,
     /// Samples of each pixel that is sampled in this frame.
     pub samples: u32,
-    /// Samples at rest start anew: the image has not rested before, or those before this frame no
-    /// longer count.
+    /// Samples start anew: the image has not rested before, or they no longer count.
     pub starts_anew: bool,
     /// Samples of each pixel that count since the image came to rest, but for the first frame.
     pub rest_samples: u64,
@@ -65,8 +62,7 @@ pub struct SamplePlacement {
     pub spreads: bool,
     /// Rays through the frame's place in each pixel are those of the previous frame.
     pub keeps_offset: bool,
-    /// Index of the first sample in the pixel's sequence. (The passes of ambient visibility in
-    /// short frames go by [`FramePlan::number`].)
+    /// Index of the first sample in the pixel's sequence, but for short frames of visibility.
     pub first_sample: u32,
     /// The paths that the pixels take.
     pub paths: PathSequence,
@@ -81,10 +77,9 @@ pub trait Signal: Sync {
         1
     }
 
-    /// Returns how many samples the frames of an image of so many pixels take. `is_cpu`: the device
-    /// is a processor, as opposed to a GPU.
+    /// Returns how many samples the frames of an image of so many pixels take.
     fn frame_samples(&self, settings: &Settings, pixels: u64, _is_cpu: bool) -> FrameSamples {
-        FrameSamples::of_visibility(settings, pixels)
+        FrameSamples::for_visibility(settings, pixels)
     }
 
     /// Checks that frames with these settings have the buffer.
@@ -100,8 +95,7 @@ pub trait Signal: Sync {
         false
     }
 
-    /// Returns true if each pixel has a history of samples, by which passes rest, and frames that
-    /// were interrupted are taken back.
+    /// Returns true if each pixel has a history of samples, which can be taken back.
     fn has_pixel_histories(&self) -> bool {
         true
     }
@@ -111,23 +105,17 @@ pub trait Signal: Sync {
         settings.history > 1
     }
 
-    /// Returns the number of frames at rest after which the image no longer changes; `None`: it
-    /// does with every frame, or it is pixels that come to rest, each on its own.
+    /// Returns the number of frames at rest after which the image does not change, if any.
     fn frames_to_rest(&self, settings: &Settings, samples: &FrameSamples) -> Option<u32> {
-        match settings.converges() {
-            true => Some(samples.frames_for(settings.rest_samples)),
-            false => settings.frames_to_rest(),
-        }
+        if settings.converges() { Some(samples.frames_for(settings.rest_samples)) } else { settings.frames_to_rest() }
     }
 
-    /// Returns the number of frames at rest in which each pixel has as many samples as
-    /// [`FrameSamples`] counts for one.
+    /// Returns the number of frames at rest in which each pixel has the samples of one.
     fn rest_period(&self, _settings: &Settings) -> u32 {
         1
     }
 
-    /// Returns true if the first frame of an image is one at rest: there are no histories to go on
-    /// with, and a place of its own for each path says more.
+    /// Returns true if the first frame of an image is one at rest: there are no histories yet.
     fn begins_at_rest(&self, _samples: &FrameSamples) -> bool {
         false
     }
@@ -165,8 +153,7 @@ pub trait Signal: Sync {
     }
 }
 
-/// What a frame does. It follows from the history and the inputs alone, and a frame is: plan, run,
-/// commit.
+/// The work of a frame. It follows from history and inputs alone; a frame is: plan, run, commit.
 ///
 /// The rules, in the order in which they are decided:
 ///
@@ -229,10 +216,7 @@ impl RestProgress {
         let is_undisturbed = !history.has_new_light && !history.was_interrupted;
         let is_still = !has_moved && inputs.signal.has_pixel_histories() && is_undisturbed;
         let begins_at_rest = !history.has_resolved && inputs.signal.begins_at_rest(samples);
-        let resting = match is_still {
-            true => history.motion.frames_at_rest().saturating_add(1),
-            false => u32::from(begins_at_rest),
-        };
+        let resting = if is_still { history.motion.frames_at_rest().saturating_add(1) } else { u32::from(begins_at_rest) };
         Self {
             motion: Motion::from_frames_at_rest(resting),
             is_still,
@@ -259,10 +243,12 @@ impl FramePlan {
 
         // where samples lie
         let placement = signal.place_samples(history, inputs, &progress);
-        let offset = match settings.antialias {
-            true if placement.keeps_offset => history.offset,
-            true => sample_offset(history.frame),
-            false => [0.0; 2],
+        let offset = if !settings.antialias {
+            [0.0; 2]
+        } else if placement.keeps_offset {
+            history.offset
+        } else {
+            sample_offset(history.frame)
         };
 
         // what is denoised at rest
@@ -286,9 +272,10 @@ impl FramePlan {
             denoises,
             has_denoised: denoises || denoised > 0,
             denoised_samples: if denoises { progress.rest_samples } else { denoised },
-            most_past: match history.has_new_light {
-                true => PAST_AFTER_NEW_LIGHT * settings.rays_per_pixel as f32,
-                false => f32::INFINITY,
+            most_past: if history.has_new_light {
+                PAST_AFTER_NEW_LIGHT * settings.rays_per_pixel as f32
+            } else {
+                f32::INFINITY
             },
             environment_turn: history.environment_turn,
         }
@@ -325,9 +312,8 @@ impl FramePlan {
     }
 }
 
-/// Where the samples of a frame lie in their pixels: offset from the centre, pixels. Places of any
-/// number of consecutive frames are even (Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", 2018).
+/// Offset of a frame's samples from their pixels' centres, pixels. Those of consecutive frames are
+/// even (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
 fn sample_offset(frame: u32) -> [f32; 2] {
     // powers of the inverse of the plastic number
     const STEPS: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
@@ -671,8 +657,7 @@ mod tests {
             assert!(!moved.plan().is_skipped);
             assert!(!Frames { has_moved_objects: true, ..frames }.plan().is_skipped);
         }
-        // as many samples as the settings say, of radiance of a pattern as many frames, and the one
-        // before
+        // as many samples as the settings say, of each frame of a pattern, and one before
         let to_rest = |frames: &Frames| frames.signal.frames_to_rest(&frames.settings, &frames.inputs().frame_samples);
         let samples = |frames: &Frames| frames.inputs().frame_samples.frames_for(frames.settings.rest_samples);
         let [full, half] = [Resolution::Full, Resolution::Half]
@@ -739,8 +724,7 @@ mod tests {
             frames.camera = camera_at(0.01 * k as f32);
             frames.frame();
         }
-        // in motion they take the sequence from its beginning: two of the first frame, then one of
-        // each
+        // in motion they take the sequence from its beginning: two, then one each
         assert_eq!(frames.history.paths.first, 2 + 4);
         let mut next = 1 << 12;
         for plan in frames.frames(40) {
@@ -763,8 +747,7 @@ mod tests {
             assert!(pattern.iter().all(|p| p.placement.first_sample == pattern[0].placement.first_sample));
         }
         let firsts: Vec<u32> = plans.iter().step_by(4).map(|p| p.placement.first_sample).collect();
-        // a camera that has stood still from the first frame has those of a still, anew in long
-        // frames
+        // a camera that stands still from the first frame has a still's, anew in long frames
         assert_eq!(firsts, [0, 0, 8, 16]);
     }
 

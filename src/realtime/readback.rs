@@ -17,9 +17,8 @@ pub struct Surface {
 }
 
 impl Realtime {
-    /// Reads the last frame, rows from the top: ambient visibility of each pixel, or linear
-    /// radiance, red, green and blue. Ambient visibility is 0 for background; of a pixel that shows
-    /// some, it is the mean over the pixel.
+    /// Reads the last frame, rows from the top: ambient visibility of each pixel, 0 for background,
+    /// or linear radiance, red, green and blue. At edges it is the mean over the surfaces.
     pub fn result(&self) -> Result<Vec<f32>> {
         let channels = self.channels();
         match self.resolved()? {
@@ -49,8 +48,7 @@ impl Realtime {
         Ok(self.estimates()?.into_iter().map(|e| e[1]).collect())
     }
 
-    /// Reads the variance of the mean of each pixel's samples in the last frame, before any spatial
-    /// filter; 0 for background.
+    /// Reads the variance of each pixel's mean before any spatial filter; 0 for background.
     pub fn variances(&self) -> Result<Vec<f32>> {
         Ok(self.estimates()?.into_iter().map(|[_, samples, variance]| variance / samples.max(1.0)).collect())
     }
@@ -101,15 +99,13 @@ impl Realtime {
         }
     }
 
-    /// Reads where the sample of a pixel shows the scene in the last frame: 1, else 0; rows from
-    /// the top.
+    /// Reads 1 where the sample of a pixel shows the scene, else 0; rows from the top.
     fn sampled(&self) -> Result<Vec<f32>> {
         let guide: Vec<[f32; 2]> = self.read(Resource::Guide)?;
         Ok(guide.iter().map(|g| if g[0] < f32::INFINITY { 1.0 } else { 0.0 }).collect())
     }
 
-    /// Reads the surface point of each pixel of the last frame, rows from the top; `None` for
-    /// background.
+    /// Reads the surface point of each pixel, rows from the top; `None` for background.
     pub fn surfaces(&self) -> Result<Vec<Option<Surface>>> {
         const WORDS: usize = SURFACE_BYTES as usize / 4;
         let now: Vec<[f32; WORDS]> = self.read(Resource::Surface)?;

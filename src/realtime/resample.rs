@@ -1,5 +1,4 @@
-//! Histories of a pipeline of another size, so that an image whose resolution changes does not
-//! begin with noise.
+//! Histories of a pipeline of another size, so that a change of size does not begin with noise.
 
 use super::Realtime;
 use super::resources::Resource;
@@ -12,7 +11,7 @@ use crate::interface::records::passes::ResampleParams;
 use crate::shaders::{self, LANES};
 use crate::tracer::{Push, Tracer};
 
-/// What the next frame reads of the previous one.
+/// Resources of the previous frame that the next one reads.
 const REMEMBERED: [Resource; 6] = [
     Resource::Guide,
     Resource::History,
@@ -22,13 +21,11 @@ const REMEMBERED: [Resource; 6] = [
     Resource::ResolvedHistory,
 ];
 
-/// Share of the surfaces in view from which on own histories, of an image at rest, are the better
-/// ones: coarser ones are of motion, and so noisier. Of what own ones lack, mirrors and glass
-/// mostly, the others know little more.
+/// Share of the surfaces in view from which own histories, of an image at rest, are better: coarser
+/// ones are of motion, and so noisier.
 const SEEN_ENOUGH: f64 = 0.75;
 
-/// Largest side of images that are resampled, pixels: products of two are numbers of 32 bits in the
-/// shader.
+/// Largest side of images that are resampled, pixels: the shader multiplies two in 32 bits.
 const MAX_SIDE: u32 = 1 << 15;
 
 impl Realtime {

@@ -64,7 +64,7 @@ pub enum Resource {
     BentResult,
     /// The displayed image, 8-bit RGBA.
     DisplayImage,
-    /// What a debug view counts.
+    /// Counts of a debug view.
     DebugCounts,
     /// Radiance: diffuse albedo and roughness of each pixel's surface.
     Materials,
@@ -114,8 +114,7 @@ pub enum Resource {
 enum Lifetime {
     /// On the host, or in the tracer's memory: no buffer is allocated.
     Host,
-    /// From its first pass to its last in a frame: resources whose lifetimes do not overlap share
-    /// memory.
+    /// From its first pass to its last in a frame: others may share the memory.
     Frame,
     /// Until it is written again.
     Kept,
@@ -145,8 +144,9 @@ impl Resource {
     fn describe(self, extent: &Extent) -> Description {
         use Lifetime::{Frame, Host, Kept, Pair};
         let Extent { pixels, half_pixels, launch_rays } = *extent;
-        // all in the device's memory, also what the host reads: a GPU takes ten times as long to
-        // write to the host's, pixel by pixel
+
+        // All are in the device's memory, also what the host reads: a GPU takes ten times as long
+        // to write to the host's, pixel by pixel.
         let device = |name, bytes, lifetime| Description { name, bytes, lifetime };
         match self {
             Self::Camera | Self::Scene | Self::FrameNumber | Self::DisplaySettings => device("host", 0, Host),
@@ -254,8 +254,7 @@ impl ResourceUse {
 /// A resource that has a buffer.
 struct Entry {
     resource: Resource,
-    /// Indices of its buffers: one, or with [`Lifetime::Pair`] this frame's and the previous
-    /// frame's.
+    /// Indices of its buffers: one, or with [`Lifetime::Pair`] this and the previous frame's.
     buffers: [usize; 2],
     /// Incremented whenever it is written.
     version: u64,
@@ -282,11 +281,9 @@ impl Resources {
     }
 
     /// Allocates buffers of resources that stages write and that have none yet. `stages` has the
-    /// uses of each stage's passes. A resource that no pass writes has no buffer, and the address
-    /// 0.
+    /// uses of each stage's passes. Resources that no pass writes have no buffer and address 0.
     pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Vec<ResourceUse>]) -> Result<()> {
-        // for each resource the first and the last stage that uses it, in the order in which they
-        // are first written
+        // first and last stage that use a resource, in the order in which they are first written
         let mut spans: Vec<(Resource, [usize; 2])> = Vec::new();
         for (k, stage) in stages.iter().enumerate() {
             for uses in stage {

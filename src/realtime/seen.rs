@@ -7,8 +7,7 @@ use crate::interface::records::passes::SeenParams;
 use crate::shaders::{self, LANES};
 use crate::tracer::{Push, Tracer};
 
-/// Counts surfaces that an image shows, and those of them that the last frame of this or another
-/// pipeline shows as well.
+/// Counts surfaces of an image, and those of them that the last frame of a pipeline shows.
 pub struct SeenSurfaces {
     pipeline: ComputePipeline,
     params: Params<SeenParams>,

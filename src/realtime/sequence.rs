@@ -32,8 +32,7 @@ impl CameraMotion {
         }
     }
 
-    /// Returns true if the camera is cut to another view after frame `before`, and at `frame` or
-    /// earlier.
+    /// Returns true if the camera is cut after frame `before`, and at `frame` or earlier.
     pub fn has_cut(&self, before: f64, frame: f64) -> bool {
         matches!(self, Self::Path(path) if path.has_cut(before, frame))
     }
@@ -117,15 +116,13 @@ impl<'a> FrameSequence<'a> {
         Ok(Self { camera, file_camera, motion, played, frames_per_second, held: None, last: None, has_cut: false })
     }
 
-    /// The same with the animation held at a time, in seconds since its start, if one is given; the
-    /// camera's motion goes on.
+    /// Holds the animation at a time in seconds, if one is given; the camera's motion goes on.
     #[must_use]
     pub fn held_at(self, seconds: Option<f64>) -> Self {
         Self { held: seconds, ..self }
     }
 
-    /// The motion that the scene must be flattened with
-    /// ([`crate::accel::flatten::FlatScene::with_motion`]).
+    /// The motion that the scene must be flattened with.
     ///
     /// # Errors
     /// [`Error::Usage`] when the scene has no such animation.
@@ -133,8 +130,7 @@ impl<'a> FrameSequence<'a> {
         self.played.as_ref().map_or(Ok(Motion::default()), |p| p.rig.motion(p.animation))
     }
 
-    /// Updates the tracer to a frame, and returns the camera and the statistics of the update.
-    /// Animations loop.
+    /// Updates the tracer to a frame, and returns the camera and statistics. Animations loop.
     ///
     /// # Errors
     /// Those of [`Tracer::update`].
@@ -164,14 +160,12 @@ impl<'a> FrameSequence<'a> {
         Ok((self.motion.camera_at(camera, frame), stats))
     }
 
-    /// Returns true if the camera's motion has a cut between the last frame and the one before it:
-    /// what is known of earlier images says nothing of the last one.
+    /// Returns true if the camera was cut before the last frame: no earlier image tells of it.
     pub fn has_cut(&self) -> bool {
         self.has_cut
     }
 
-    /// The scene as it is in the last frame, if the animation moves lights or surfaces that emit
-    /// light.
+    /// The scene as it is in the last frame, if its animation moves lights or emissive surfaces.
     pub fn posed_lights(&self) -> Option<&Arc<Scene>> {
         self.played.as_ref()?.posed.as_ref()
     }

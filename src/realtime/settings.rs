@@ -30,7 +30,7 @@ impl Resolution {
         1 << self as u32
     }
 
-    /// Width and height of the image that the pixels sampled in a frame make, for an image of `size`: of cells of which one pixel is sampled.
+    /// Size of the image of sampled pixels, for an image of `size`: one pixel of each cell.
     pub fn sampled_size(self, size: [u32; 2]) -> [u32; 2] {
         let cell = match self {
             Self::Full => [1, 1],
@@ -86,7 +86,7 @@ impl Filter {
         Specialization::default().set(constants::FILTER_STRIDES, self.steps().iter().any(|s| s.stride > 1))
     }
 
-    /// The steps of the filter, in order; at least one, because the last step converts estimates to the result.
+    /// Steps of the filter, at least one, because the last one converts estimates to the result.
     pub fn steps(&self) -> Vec<FilterStep> {
         let step = |radius, stride| FilterStep { radius, stride };
         match self.kind {
@@ -101,26 +101,27 @@ impl Filter {
     }
 }
 
-/// Constants of the screen-space technique, as XeGTAO (Intel 2021) has them. They make up for what a depth image and a few steps cannot know.
+/// Constants of the screen-space technique, as XeGTAO (Intel 2021) has them. They make up for what
+/// a depth image and a few steps cannot know.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct GtaoConstants {
     /// Factor of the distances at which geometry occludes, above 0.
     pub radius_scale: f32,
     /// Share of the radius over which occlusion fades out before it, above 0, at most 1.
     pub fade: f32,
-    /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer to the pixel.
+    /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer.
     pub step_exponent: f32,
-    /// Factor of distances along the view beyond 1, at least 0: what lies far behind or before the pixel occludes less, as if it was thin.
+    /// Factor of distances along the view beyond 1: hits far behind or before occlude less.
     pub thinness: f32,
     /// Exponent of the ambient visibility.
     pub visibility_exponent: f32,
 }
 
 impl GtaoConstants {
-    /// The formula of Jimenez et al. (2016) as it stands: right where the image shows all occluders and steps are many.
+    /// The formula of Jimenez et al. (2016), for images with all occluders and many steps.
     pub const FORMULA: Self =
         Self { radius_scale: 1.0, fade: 0.2, step_exponent: 2.0, thinness: 0.0, visibility_exponent: 1.0 };
-    /// Those of the presets, as `benches/studies/tune_gtao.rs` fitted them.
+    /// Constants of the presets, as `benches/studies/tune_gtao.rs` fitted them.
     pub const PRESETS: Self =
         Self { radius_scale: 2.0125, fade: 0.7625, step_exponent: 1.1875, thinness: 0.0, visibility_exponent: 1.375 };
 }
@@ -128,7 +129,7 @@ impl GtaoConstants {
 /// Settings of the real-time pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Settings {
-    /// AO technique. The settings below are for ray-traced AO; those but the rays also apply to the screen-space technique.
+    /// AO technique. Settings below are for ray-traced AO; but for rays, also for screen space.
     pub technique: Technique,
     /// Primary visibility; `None`: the faster one on the device ([`Primary::auto`]).
     pub primary: Option<Primary>,
@@ -151,29 +152,30 @@ pub struct Settings {
     pub history: u32,
     /// Stop tracing rays for pixels whose history is full while nothing moves.
     pub rest: bool,
-    /// History clamping near moving objects: half width in standard errors of the neighbourhood's mean; 0: off.
+    /// Half width of history clamping near moving objects, in standard errors of the mean; 0: off.
     pub clamp: f32,
     /// Strength with which moving objects shorten histories; 0: off.
     pub moved_weight: f32,
     /// Spatial filter.
     pub filter: Filter,
-    /// Screen-space technique: number of slices through the view ray, and of steps on each side of a slice.
+    /// Screen-space technique: number of slices through the view ray, and of steps on each side.
     pub gtao: [u32; 2],
     /// Screen-space technique: its constants.
     pub gtao_constants: GtaoConstants,
     /// Larsen's pipeline: scene units per unit of length in the paper.
     pub unit: f64,
-    /// Samples lie at different places within the pixels from frame to frame, and the image is averaged over frames: edges are antialiased.
+    /// Sample positions in pixels change from frame to frame, and averaging antialiases edges.
     pub antialias: bool,
-    /// At rest the image converges to the still: the mean of all samples since then takes over. Else it stays as the filter leaves it.
+    /// At rest the image converges to the still: the mean of all samples at rest takes over.
     pub converge: bool,
-    /// Samples per pixel at rest after which an image that converges counts as converged, and no more are taken.
+    /// Samples per pixel at rest after which a converging image counts as converged.
     pub rest_samples: u32,
-    /// Radiance at rest: number of bounces after which Russian roulette may end paths, if more than in motion.
+    /// Radiance at rest: bounces before Russian roulette may end paths, if more than in motion.
     pub rest_rr_depth: u32,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
-    /// Maximum rays of a launch, if fewer than the device's ([`crate::tracer::stream::launch_rays`]). Small launches let a frame be interrupted soon
+    /// Maximum rays of a launch, if fewer than the device's
+    /// ([`crate::tracer::stream::launch_rays`]). Frames of small launches can be interrupted soon
     /// ([`super::Realtime::frame_with`]); images do not depend on it.
     #[serde(skip)]
     pub launch_rays: u32,
@@ -188,7 +190,7 @@ impl Default for Settings {
 impl Settings {
     /// Maximum rays per pixel and frame.
     pub const MAX_RAYS: u32 = 4096;
-    /// Maximum history length in samples: the largest number up to which half floats represent all integers.
+    /// Maximum history length in samples, up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
 
     /// Minimum of [`Settings::rest_samples`] for radiance, which is noisier.
@@ -199,10 +201,10 @@ impl Settings {
         self.converge && self.history > 1 && self.technique == Technique::Traced
     }
 
-    /// Frames at rest that antialiasing averages after histories are full: as many places within a pixel.
+    /// Positions within a pixel that antialiasing averages at rest, in as many frames.
     const PLACES: u32 = 64;
 
-    /// Number of frames at rest after which the image no longer changes; `None`: with every frame, or it is pixels that come to rest, each on its own.
+    /// Number of frames at rest after which the image no longer changes, if there is one.
     pub fn frames_to_rest(&self) -> Option<u32> {
         let period = self.resolution.period();
         if self.converges() {
@@ -295,20 +297,22 @@ choices! {
 }
 
 impl Preset {
-    /// Whether frames of a renderer are antialiased unless their settings say otherwise. The error against antialiased images is lower then, at rest and in motion
-    /// (docs/realtime.md). [`Preset::settings`] samples pixel centres: what the pipeline alone is measured by.
+    /// Whether a renderer's frames are antialiased by default, which lowers their error
+    /// (docs/realtime.md). [`Preset::settings`] samples pixel centres, to measure the pipeline
+    /// alone.
     pub fn antialiases(self) -> bool {
         matches!(self, Self::Fast | Self::Balanced | Self::Quality)
     }
 
-    /// Bounces before Russian roulette may end a path of the preset, unless the settings of paths say so. With `fast` it may end at the first: that halves the time of rays, and the filter takes
-    /// away more noise than it adds.
+    /// Default number of bounces before Russian roulette may end a path. With `fast` it may end at
+    /// the first: that halves the time of rays, and the filter takes away more noise than it adds.
     pub fn rr_depth(self) -> u32 {
         if self == Self::Fast { 1 } else { PathOptions::default().rr_depth }
     }
 
     /// The settings of the preset.
     pub fn settings(self) -> Settings {
+        // Settings that presets share.
         let common = Settings {
             technique: Technique::Traced,
             primary: None,
@@ -334,8 +338,9 @@ impl Preset {
             bent: false,
             launch_rays: u32::MAX,
         };
+
+        // Each preset's own; the paper traces closest hits up to 100 units, whatever the falloff.
         match self {
-            // the paper traces closest hits up to 100 units, whatever the falloff
             Preset::Larsen => Settings {
                 technique: Technique::Larsen,
                 rays_per_pixel: 64,

@@ -5,7 +5,7 @@ use crate::film::camera::CameraRecord;
 
 /// A point that moved by less, by the length that occlusion reaches, has not moved.
 const SAME: f64 = 1e-5;
-/// Footprints of a pixel within which a point is the one that was seen: surfaces are seen at a slant.
+/// Footprints of a pixel within which a point is the one that was seen, at a slant.
 const SEEN: f64 = 4.0;
 
 type Surfaces = [Option<Surface>];
@@ -40,7 +40,7 @@ pub fn newly_seen(now: &Surfaces, before: &Surfaces, camera: &CameraRecord, size
     now.iter().map(|s| f32::from(u8::from(s.as_ref().is_some_and(|s| !seen(s))))).collect()
 }
 
-/// Where a point is in the image, in pixels, and the size of a pixel there; `None` behind a camera with perspective.
+/// Position of a point in the image and size of a pixel there, pixels; `None` behind the camera.
 fn project(p: [f32; 3], camera: &CameraRecord, size: [u32; 2]) -> Option<([f64; 2], f64)> {
     let m = camera.camera_to_world;
     let from_eye = [0, 1, 2].map(|k| f64::from(p[k] - m[k][3]));

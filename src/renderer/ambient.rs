@@ -1,7 +1,6 @@
-//! Samples of ambient light: what of an image changes with the radius and falloff of ambient occlusion, and with the ambient colour.
+//! Samples of ambient light: how an image changes with radius and falloff of ambient occlusion.
 
 use super::complete::Completed;
-use super::still::scene_warnings;
 use super::{RenderSettings, Renderer, TracerRequest};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
@@ -10,8 +9,8 @@ use crate::integrators::path::ambient::{self, TakeSamples};
 use crate::scene::Motion;
 
 impl Renderer {
-    /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name, to their nearest hits, and hands the distances to `take`: by them the image is known
-    /// for every radius, falloff and ambient colour.
+    /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name,
+    /// to their nearest hits. The distances that `take` receives tell the image for every radius.
     ///
     /// # Errors
     /// As [`Renderer::still`].
@@ -27,7 +26,7 @@ impl Renderer {
         let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
         let ready = self.tracer.take();
         let scene = &self.scene;
-        let mut warnings = scene_warnings(scene);
+        let mut warnings = scene.report.all_warnings();
         let job = settings.job(scene, &camera);
         let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
         let request = TracerRequest {

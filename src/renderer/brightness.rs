@@ -1,4 +1,4 @@
-//! Whether an image shows anything: its mean over the pixels that show surfaces, and what to do about one that is all but black or white.
+//! Whether an image shows anything: its mean over surfaces, and a remedy if all is black or white.
 
 use crate::film::accumulate::Accumulated;
 use crate::settings::Capability;
@@ -10,8 +10,8 @@ const COVERED: f32 = 0.99;
 /// Luminance of linear sRGB.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// The mean of the pixels that show nothing but surfaces: of one channel, or the luminance of three. `None` if there are no such pixels.
-pub fn of_surfaces(image: &Accumulated, channels: usize) -> Option<f64> {
+/// Mean of the pixels that show surfaces alone, luminance for colours; `None` without any.
+pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
     let film = &image.film;
     let weights: &[f64] = if channels == 3 { &LUMINANCE } else { &[1.0] };
     let count = film.coverage.iter().filter(|a| **a >= COVERED).count();
@@ -21,7 +21,7 @@ pub fn of_surfaces(image: &Accumulated, channels: usize) -> Option<f64> {
     (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
 }
 
-/// What is wrong with an image of this mean, and what to do about it; `None` if nothing is. `capabilities`: of its integrator, `exposure` in stops.
+/// A warning about an image of this mean, with a remedy; `None` if it is fine. `exposure` in stops.
 pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<String> {
     use Capability::{AmbientOcclusion, SceneLights, WhiteSky};
     let [least, most] = RANGE;
@@ -37,7 +37,8 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
                 "the image is all but black: surfaces have a mean radiance of {mean:.2e}; --exposure {stops} shows them"
             )),
             v if v > most => Some(format!(
-                "the image is all but white: surfaces have a mean radiance of {mean:.3}; --exposure {stops} or --tone-map agx shows them"
+                "the image is all but white: surfaces have a mean radiance of {mean:.3}; \
+                 --exposure {stops} or --tone-map agx shows them"
             )),
             _ => None,
         };
@@ -53,7 +54,8 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
     match mean {
         v if v < least => Some(format!("the image is all but black: surfaces in view are {:.1} % open; {darker}", 100.0 * v)),
         v if v > most => Some(format!(
-            "the image is all but white: surfaces in view are {:.1} % open; --view inside, --eye and --target look at another place{}",
+            "the image is all but white: surfaces in view are {:.1} % open; \
+             --view inside, --eye and --target look at another place{}",
             100.0 * v,
             if can(AmbientOcclusion) { ", a larger --ao-radius finds occluders farther away" } else { "" }
         )),

@@ -1,4 +1,4 @@
-//! A camera as numbers, for metadata and reports: position and direction as settings have them, and the matrices of the OpenEXR standard.
+//! A camera as numbers, for metadata and reports: as settings have it, and as matrices of OpenEXR.
 
 use glam::{DMat4, DVec3};
 use serde_json::{Value, json};
@@ -10,8 +10,9 @@ use crate::scene::{Camera, ClipPlanes, Projection};
 /// Metadata key of [`pose`].
 pub const POSE: &str = "camera_pose";
 
-/// Position (`eye`), a point in the middle of the image (`target`), up vector (`up`), scene units; and vertical field of view in degrees (`fov_y`), or half of the height of the image in
-/// scene units (`half_height`) if the camera is orthographic; its clipping planes (`clip`), if it has some. As `--eye`, `--target`, `--up`, `--fov-y` and `--clip` they give the same camera.
+/// The camera as `--eye`, `--target`, `--up`, `--fov-y` and `--clip` give it: `eye`, `target` (a
+/// point in the middle of the image), `up`, scene units; `fov_y` in degrees, or `half_height` of
+/// the image if it is orthographic; and `clip`, if it has clipping planes.
 pub fn pose(camera: &Camera) -> Value {
     let m = &camera.camera_to_world;
     // far enough for the direction to survive the sum
@@ -31,7 +32,7 @@ pub fn pose(camera: &Camera) -> Value {
     pose
 }
 
-/// The settings that choose the perspective camera of a [`pose`] as metadata hold it; `None` if it is none.
+/// The settings of the perspective camera of a [`pose`] in metadata; `None` if it is none.
 pub fn settings(pose: &str) -> Option<CameraSettings> {
     let pose: Value = serde_json::from_str(pose).ok()?;
     let vector = |key: &str| serde_json::from_value(pose[key].clone()).ok().map(DVec3::from_array);
@@ -45,8 +46,9 @@ pub fn settings(pose: &str) -> Option<CameraSettings> {
     })
 }
 
-/// The matrices from world space to camera space, and to normalized device coordinates of an image of `aspect` = width / height. They multiply columns; z / w is 1 - 1 / distance in
-/// scene units along the view direction if the camera is a perspective one, else this distance.
+/// The matrices from world space to camera space, and to normalized device coordinates of an image
+/// of `aspect` = width / height. They multiply columns; z / w is 1 - 1 / distance along the view
+/// direction in scene units if the camera is a perspective one, else this distance.
 pub fn matrices(camera: &Camera, aspect: f64) -> [DMat4; 2] {
     let to_camera = DMat4::from(camera.camera_to_world.inverse());
     let columns = |half: f64, z: [f64; 2], w: [f64; 2]| {
@@ -71,7 +73,7 @@ pub fn matrices(camera: &Camera, aspect: f64) -> [DMat4; 2] {
 
 /// Metadata of a camera: its pose as JSON, and its matrices.
 pub fn metadata(camera: &Camera, aspect: f64) -> [(&'static str, String); 3] {
-    // no -0; columns of a matrix that multiplies columns are rows of one that multiplies rows, as EXR files have it
+    // no -0; EXR files have matrices that multiply rows: their rows are these columns
     let [to_camera, to_ndc] = matrices(camera, aspect).map(|m| matrix_text(&m.to_cols_array().map(|v| v as f32 + 0.0)));
     [(POSE, pose(camera).to_string()), (WORLD_TO_CAMERA, to_camera), (WORLD_TO_NDC, to_ndc)]
 }

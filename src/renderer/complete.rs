@@ -1,6 +1,7 @@
-//! What settings leave open, completed by the scene: the camera, the AO radius, and light where there is none.
+//! Completes settings by the scene: the camera, the AO radius, and light where there is none.
 //!
-//! This is the one rule for all commands. What is chosen is also known as options ([`Completed::chosen`]): with them the same image is made, whatever becomes of the scene.
+//! This is the one rule for all commands. Its choices are also known as options
+//! ([`Completed::chosen`]): with them the same image is made, whatever becomes of the scene.
 
 use glam::DVec3;
 
@@ -30,21 +31,21 @@ pub struct Completed {
     pub camera: Camera,
     /// The settings, whose AO radius is a number of scene units.
     pub settings: RenderSettings,
-    /// Of camera, AO radius and light what the scene decided: as settings they choose the same.
+    /// The camera, AO radius and light that the scene decided, as settings that choose the same.
     pub chosen: RenderSettings,
-    /// What was chosen, and how to choose otherwise, a sentence each.
+    /// A sentence for each choice, and how to choose otherwise.
     pub choices: Vec<String>,
 }
 
 impl Completed {
-    /// What the scene decided, as options of `skylit render`; `None` if that is nothing.
+    /// The choices of the scene as options of `skylit render`; `None` if there are none.
     pub fn options(&self) -> Option<String> {
         Some(options_text(&self.chosen)).filter(|text| !text.is_empty())
     }
 }
 
 impl Renderer {
-    /// Understands and lights the scene as settings say and completes them. `camera`: instead of that of the settings.
+    /// Reads and lights the scene as settings say and completes them. `camera` replaces theirs.
     ///
     /// # Errors
     /// Those of the settings that do not fit the scene.
@@ -55,7 +56,7 @@ impl Renderer {
         let capabilities = integrator.capabilities();
         // what has ambient light is not black without another
         let needs_light = capabilities.contains(&Capability::SceneLights) && !capabilities.contains(&Capability::AmbientLight);
-        // the light that was chosen for a dark scene stays as long as it makes no difference: nothing is built again
+        // the light of a dark scene stays as long as it makes no difference: nothing is rebuilt
         let stays = self.lighting.is_automatic && is_default && (needs_light || !integrator.sees_environment());
         if !stays {
             self.light(&settings.lighting)?;
@@ -117,7 +118,7 @@ impl Renderer {
         Ok(Completed { camera, settings, chosen, choices })
     }
 
-    /// Light for a dark scene that is looked at from many places, by integrators of which some need it.
+    /// Lights a dark scene that is seen from many places, by integrators of which some need it.
     ///
     /// # Errors
     /// Those of [`LightingSettings::apply`].
@@ -128,9 +129,9 @@ impl Renderer {
             let Ok((lo, hi)) = survey.bounds() else { return Ok(()) };
             let camera = match self.scene.cameras.first() {
                 Some(camera) => camera.clone(),
-                // from the middle of a scene it is found out whether it is a closed room, without a hierarchy
+                // the middle of a scene shows whether it is a closed room, without a hierarchy
                 None if survey.is_small() && survey.walls((lo + hi) * 0.5).is_some() => {
-                    framing::of_scene(&survey, ASPECT, None)?.camera()
+                    framing::choose_on_host(&survey, ASPECT, None)?.camera()
                 }
                 None => Camera::framing(lo, hi, ASPECT),
             };
@@ -142,7 +143,7 @@ impl Renderer {
     }
 }
 
-/// The image size that follows from the scene's camera, and what there is to say about it; `None` where settings or scene give one, or it is that of all others.
+/// The image size of the scene's camera, and a sentence on it; `None` if given or the default.
 fn size_of_camera(settings: &RenderSettings, scene: &Scene) -> Option<([u32; 2], String)> {
     if settings.image.size.or(scene.hints.size).is_some() {
         return None;
@@ -153,7 +154,7 @@ fn size_of_camera(settings: &RenderSettings, scene: &Scene) -> Option<([u32; 2],
     Some((size, format!("image size: {width}x{height}, of the aspect ratio of the scene's camera, {:.4} (--size)", aspect)))
 }
 
-/// What there is to say about clipping planes that hide something, as far as the scene's bounds tell.
+/// A sentence on clipping planes that hide something, as far as the scene's bounds tell.
 fn clipped(camera: &Camera, survey: &Survey) -> Option<String> {
     let (lo, hi) = survey.bounds().ok().filter(|_| camera.clip != ClipPlanes::NONE)?;
     let to_camera = camera.camera_to_world.inverse();

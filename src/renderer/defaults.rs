@@ -1,7 +1,8 @@
-//! Defaults of settings from files called `skylit.toml`: one in the user's configuration folder, one beside the scene. docs/settings.md describes them.
+//! Defaults of settings from files called `skylit.toml`: one in the user's configuration folder,
+//! one beside the scene. docs/settings.md describes them.
 //!
-//! A default is not a choice: one that has no effect on what is rendered is left out, where the same setting on the command line would be an error, and none turns
-//! a still into frames in real time.
+//! A default is not a choice: one without effect is left out, where the same setting on the command
+//! line would be an error, and none turns a still into frames in real time.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -20,8 +21,9 @@ use crate::tracer::DeviceSettings;
 /// Name of the files.
 pub const FILE_NAME: &str = "skylit.toml";
 
-/// Settings that a file beside a scene may have: how the scene is looked at, lit and sampled. An entry that ends with a dot is a table, with all that is in it. What
-/// comes with a scene comes from strangers: it does not choose what is written, what is loaded besides images and camera paths, or on which device.
+/// Settings that a file beside a scene may have: how the scene is seen, lit and sampled. An entry
+/// that ends with a dot is a table with all that is in it. Such a file comes from strangers: it
+/// does not choose what is written, what is loaded besides images and camera paths, or a device.
 const SCENE_SETTINGS: [&str; 12] = [
     "integrator",
     "scene.",
@@ -40,7 +42,7 @@ const SCENE_SETTINGS: [&str; 12] = [
 /// A file of defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DefaultsFile {
-    /// Its path.
+    /// Path of the file.
     pub path: PathBuf,
     /// Settings of renders, by the keys of settings files.
     pub settings: RenderSettings,
@@ -48,7 +50,7 @@ pub struct DefaultsFile {
     pub device: DeviceSettings,
 }
 
-/// What was taken from a file of defaults.
+/// The defaults taken from a file.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct DefaultsReport {
     /// The file.
@@ -85,15 +87,16 @@ pub struct Resolved {
     pub settings: RenderSettings,
     /// Device and tracer.
     pub device: DeviceSettings,
-    /// What was taken from each file, in the order of the files.
+    /// The defaults taken from each file, in the order of the files.
     pub reports: Vec<DefaultsReport>,
 }
 
-/// The files of defaults that exist: of the configuration folder, then of the folder of `scene`. Later ones replace what earlier ones say. `confine`: where the file of
-/// the scene's folder, and those that it names, have to lie.
+/// The files of defaults that exist: of the configuration folder, then of the folder of `scene`,
+/// which prevails. `confine` says where the latter, and files that it names, must lie.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may not choose, and for a file that lies elsewhere.
+/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may
+/// not choose, and for a file that lies elsewhere.
 pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
@@ -124,7 +127,7 @@ impl DefaultsFile {
         }
     }
 
-    /// Checks that a file beside a scene has the settings alone that a scene may choose ([`SCENE_SETTINGS`]).
+    /// Checks that a file beside a scene has no settings but [`SCENE_SETTINGS`].
     fn check_scene_settings(&self) -> Result<()> {
         let may = |key: &str| SCENE_SETTINGS.iter().any(|s| if s.ends_with('.') { key.starts_with(s) } else { key == *s });
         let refused: Vec<_> = leaves(&self.settings, &self.device).into_keys().filter(|key| !may(key)).collect();
@@ -151,7 +154,7 @@ impl DefaultsFile {
     /// Reads a file of defaults. Relative paths in it start at its folder.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that cannot be read, and for a setting that does not exist or has a wrong value.
+    /// [`Error::Input`] for files that cannot be read, unknown settings and wrong values.
     pub fn load(path: &Path) -> Result<Self> {
         Self::parse(path, &files::read_text(path)?)
     }
@@ -213,8 +216,8 @@ fn check_values(settings: &RenderSettings) -> Result<(), String> {
     <Flags as clap::Parser>::try_parse_from(settings.flags()).map(drop).map_err(|e| usage_message(&e))
 }
 
-/// Fills in defaults: `settings` and `device` replace what the files say, and a later file what an earlier one says. `holds` returns true for settings that have an
-/// effect together: a default that it refuses is left out.
+/// Fills in defaults: `settings` and `device` replace those of files, a later file an earlier one.
+/// A default is left out where `holds` returns false: settings without effect together.
 pub fn resolve(
     files: &[DefaultsFile],
     settings: &RenderSettings,
@@ -280,7 +283,7 @@ fn is_camera(name: &str) -> bool {
     all.editable().iter().any(|s| s.name == name)
 }
 
-/// The settings of `own` that hold together with those `above`. Options of the compute tracer do not choose it, as they do on the command line.
+/// The settings of `own` that hold with those `above`; none chooses the compute tracer by itself.
 fn holding_device(own: &DeviceSettings, above: &DeviceSettings) -> DeviceSettings {
     let holds = |device: &DeviceSettings| {
         let chooses = above.compute_only_option().is_none() && device.compute_only_option().is_some();
@@ -396,7 +399,6 @@ mod tests {
         assert_eq!(device(Some("query")).bvh_cache, None);
     }
 
-    /// What comes with a scene says how it looks, and nothing about files, devices or code.
     #[test]
     fn a_scene_chooses_how_it_looks_and_no_more() {
         let allowed = "integrator = \"path\"\n[image]\nspp = 4\nsize = [8, 8]\nseed = 1\npixel_filter = \"box\"\n[camera]\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n\

@@ -11,7 +11,7 @@ use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::output::{Channel, Samples};
 
-/// A control that ignores a request to keep the image so far: denoising runs to its end. If the request is an error, it is returned.
+/// A control that does not stop denoising when the image so far is kept; errors end it.
 struct UninterruptedControl<'a>(&'a mut dyn Control);
 
 impl Control for UninterruptedControl<'_> {
@@ -75,8 +75,8 @@ impl<'a> Denoising<'a> {
         self.chosen.denoiser.name()
     }
 
-    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`, `noisy.G`, `noisy.B`, or `noisy.Y`. An interruption ends it, unless `control`
-    /// keeps the image so far, which is then denoised, too.
+    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`
+    /// and so on. An interruption ends it, unless `control` keeps the image so far, denoised, too.
     pub fn channels(
         &self,
         accumulated: &Accumulated,

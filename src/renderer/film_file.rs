@@ -12,7 +12,7 @@ const LAYER: &str = "state";
 /// Suffix of metadata keys whose value is a hash of the contents of what the key without it names.
 const HASH: &str = ".hash";
 
-/// Metadata that must agree between an image and the render that resumes it: keys and values, `None` if the image lacks the key.
+/// Metadata in which an image and the render that resumes it must agree; `None`: no such key.
 pub type Identity = Vec<(&'static str, Option<String>)>;
 
 /// The tracer and the device that rendered an image.
@@ -26,13 +26,9 @@ pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
         .enumerate()
         .map(|(k, word)| {
             let plane = state.plane(k);
-            channel(
-                &word.name,
-                match word.float {
-                    true => Samples::F32(plane.into_iter().map(f32::from_bits).collect()),
-                    false => Samples::U32(plane),
-                },
-            )
+            let samples =
+                if word.float { Samples::F32(plane.into_iter().map(f32::from_bits).collect()) } else { Samples::U32(plane) };
+            channel(&word.name, samples)
         })
         .collect();
     out.push(channel("samples", Samples::U32(state.samples_plane())));
@@ -47,12 +43,12 @@ pub struct Resumed {
     pub warning: Option<String>,
 }
 
-/// Reads the film from an image file, for an image of `size` pixels with `spp` samples in all, whose values are called `names`. `scene` is the scene's name;
-/// `identity` and `rendered_by` are those of this render.
+/// Reads the film from an image file, for an image of `size` pixels with `spp` samples in all,
+/// whose values are called `names`. `identity` and `rendered_by` are those of this render.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`], naming the difference, for one of a
-/// different render, and for one that has more than `spp` samples already.
+/// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`] for one of a
+/// different render, naming the difference, or with more than `spp` samples.
 pub fn resume(
     path: &Path,
     scene: &str,
@@ -67,9 +63,12 @@ pub fn resume(
     if matches!(state, StoredState::None) {
         return Err(Error::input(path, "it has no film state to resume; render it with --resumable"));
     }
+
+    // The image must be of the same render.
     let differs = |what: &str, its: &str, ours: &str| {
         Error::Usage(format!(
-            "--resume {}: its {what} is {its}, this run's is {ours}; all settings must be those of the render that is resumed",
+            "--resume {}: its {what} is {its}, this run's is {ours}; \
+             all settings must be those of the render that is resumed",
             path.display()
         ))
     };
@@ -90,10 +89,13 @@ pub fn resume(
             state.max_samples()
         )));
     }
+
+    // Another device or tracer does no harm, but rounds differently.
     let other = rendered_by.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));
     let warning = other.map(|(key, ours)| {
         format!(
-            "{} was started with {key} {}, and is resumed with {ours}: correct, but not bit-identical to an uninterrupted render",
+            "{} was started with {key} {}, and is resumed with {ours}: correct, \
+             but not bit-identical to an uninterrupted render",
             path.display(),
             image.metadata(key).unwrap_or("unknown")
         )

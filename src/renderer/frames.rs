@@ -6,21 +6,21 @@ use super::brightness;
 use super::complete::{CHOSEN, Completed};
 use super::laps::{self, Laps};
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
-use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
+use super::still::{aov_needs, camera_text, spp_text};
 use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::film::Control;
 use crate::film::camera::CameraRecord;
+use crate::film::{Control, covered_mean};
 use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::{PathOptions, PixelFilter};
 use crate::integrators::{IntegratorName, PictureOptions};
 use crate::output::png::Colour;
-use crate::output::{Channel, Image, Samples};
+use crate::output::{Channel, Image};
 use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
@@ -46,7 +46,7 @@ pub struct Frames<'r> {
     size: [u32; 2],
     origin: glam::DVec3,
     aov: Vec<Aov>,
-    /// What the integrator can do, and how pictures show it.
+    /// Capabilities of the integrator, by which warnings are chosen.
     capabilities: &'static [Capability],
     options: PictureOptions,
     shown: DisplayMode,
@@ -70,15 +70,16 @@ pub struct FrameOutput {
 }
 
 impl Renderer {
-    /// Prepares real-time frames: those of `settings.frames`, after the warm-up. `displays`: convert each frame to 8 bits ([`Frames::displayed`]).
+    /// Prepares the frames of `settings.frames`, after the warm-up. `displays`: convert each frame
+    /// to 8 bits ([`Frames::displayed`]).
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device.
+    /// [`Error::Usage`] for settings that do not fit each other or the scene; those of the device.
     pub fn frames(&mut self, settings: &RenderSettings, displays: bool, control: &mut dyn Control) -> Result<Frames<'_>> {
+        // Complete the settings by the scene, if they have an effect together.
         settings.check()?;
         let mut laps = Laps::after_open(self.open_seconds.wall);
         let timeline = &settings.frames;
-        // before anything is looked at
         frame_settings(settings)?;
         let range = timeline.range();
         let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
@@ -87,31 +88,35 @@ impl Renderer {
         let chosen = completed.options();
         let Completed { camera, settings, choices, .. } = completed;
         laps.lap(laps::SURVEY);
-        let how = frame_settings(&settings)?;
+        let realtime_settings = frame_settings(&settings)?;
         let scene = &self.scene;
-        let mut warnings = scene_warnings(scene);
+        let mut warnings = scene.report.all_warnings();
         warnings.iter().for_each(|w| control.warning(w));
 
+        // The motion of camera and scene.
         let size = settings.size(scene);
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
         let motion = camera_motion(scene, path, timeline.orbit)?;
         let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
         let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
+
+        // The tracer. A single frame is one whose histories are full, not what it converges to.
         let integrator = settings.integrator();
         let is_radiance = !is_ambient_occlusion(integrator);
         let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };
         let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, blend)?;
-        // a single frame is one of a history that is full, and not what it converges to
         let is_cpu = self.device.info.is_cpu();
-        let settling = || Realtime::frames_for(&how, size, is_radiance, is_cpu, frames_of_history(&how));
+        let settling =
+            || Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings));
         let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {
-            needs: frame_needs(&settings, &how),
-            streams: frame_streams(&settings, &how),
+            needs: frame_needs(&settings, &realtime_settings),
+            streams: frame_streams(&settings, &realtime_settings),
             rays: frames.saturating_mul(u64::from(size[0]) * u64::from(size[1])).saturating_mul(
-                1 + u64::from(how.rays_per_pixel) * if is_radiance { integrator.get().rays_per_sample() } else { 1 },
+                1 + u64::from(realtime_settings.rays_per_pixel)
+                    * if is_radiance { integrator.get().rays_per_sample() } else { 1 },
             ),
             control: &mut *control,
             warnings: &mut warnings,
@@ -119,11 +124,15 @@ impl Renderer {
         laps.lap("prepare");
         let tracer = request.build(&self.device, self.kind, &flat, self.compute, &self.settings)?;
         laps.lap("build");
-        let options = frame_path_options(&settings, scene, &camera, size, &how)?;
-        let mut realtime = pipeline(&tracer, &flat, size, &how, options.as_ref())?;
+
+        // The pipeline of passes.
+        let options = frame_path_options(&settings, scene, &camera, size, &realtime_settings)?;
+        let mut realtime = pipeline(&tracer, &flat, size, &realtime_settings, options.as_ref())?;
         if displays {
             realtime.display(&tracer, Some(frame_display(&settings, scene)))?;
         }
+
+        // Metadata of images, and the report.
         let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
@@ -134,25 +143,25 @@ impl Renderer {
                 options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
             }
             None => vec![
-                ("ao.falloff", how.falloff.to_string()),
-                ("ao.radius", how.radius.to_string()),
-                ("ao.normal", how.hemisphere.to_string()),
-                ("sequence", how.sequence.to_string()),
-                ("technique", how.technique.to_string()),
+                ("ao.falloff", realtime_settings.falloff.to_string()),
+                ("ao.radius", realtime_settings.radius.to_string()),
+                ("ao.normal", realtime_settings.hemisphere.to_string()),
+                ("sequence", realtime_settings.sequence.to_string()),
+                ("technique", realtime_settings.technique.to_string()),
             ],
         };
-        let filter = if how.antialias { PixelFilter::Box } else { PixelFilter::Centre };
+        let filter = if realtime_settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
         metadata.extend([
             ("device", format!("{} ({})", setup.device, setup.driver)),
-            ("history", how.history.to_string()),
+            ("history", realtime_settings.history.to_string()),
             ("integrator", integrator.name().into()),
             ("pixel_filter", filter.to_string()),
             ("preset", preset.to_string()),
             ("primary", primary.to_string()),
-            ("rays_per_pixel", how.rays_per_pixel.to_string()),
-            ("resolution", how.resolution.to_string()),
+            ("rays_per_pixel", realtime_settings.rays_per_pixel.to_string()),
+            ("resolution", realtime_settings.resolution.to_string()),
             ("scene", files::portable_name(&setup.scene)),
-            ("seed", how.seed.to_string()),
+            ("seed", realtime_settings.seed.to_string()),
             ("tracer", setup.tracer.to_string()),
             ("version", env!("CARGO_PKG_VERSION").into()),
         ]);
@@ -162,7 +171,7 @@ impl Renderer {
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
             setup,
             preset,
-            settings: how,
+            settings: realtime_settings,
             primary,
             primary_reason: realtime.primary_reason().to_owned(),
             frames: Vec::new(),
@@ -170,7 +179,8 @@ impl Renderer {
             brightness: None,
             seconds: Seconds::default(),
         };
-        // pipelines that later calls reuse
+
+        // Keep the pipelines for later calls.
         self.pipelines = self.device.live_pipelines();
         laps.lap("prepare");
         Ok(Frames {
@@ -257,12 +267,12 @@ impl Frames<'_> {
         Ok(Some(FrameOutput { number, kept }))
     }
 
-    /// The last frame as an image: `Y` ambient visibility, or `R`, `G`, `B` linear radiance, `A` coverage, `samples` accumulated in each pixel, and auxiliary outputs.
+    /// The last frame as an image: `Y` ambient visibility, or `R`, `G`, `B` linear radiance, `A`
+    /// coverage, `samples` accumulated in each pixel, and auxiliary outputs.
     ///
     /// # Errors
     /// Those of the device.
     pub fn image(&self, control: &mut dyn Control) -> Result<Image> {
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
         let realtime = &self.realtime;
         let (coverage, samples) = (realtime.coverage()?, realtime.samples()?);
         let counts = || samples.iter().zip(&coverage).filter(|(_, c)| **c > 0.0).map(|(n, _)| n.ceil() as u32);
@@ -272,15 +282,15 @@ impl Frames<'_> {
             _ => self.report.settings.rays_per_pixel.to_string(),
         };
         let mut channels = colour_channels(realtime)?;
-        channels.extend([f32s("A", coverage), f32s("samples", samples)]);
+        channels.extend([Channel::from_floats("A", coverage), Channel::from_floats("samples", samples)]);
         if self.aov.iter().any(|a| *a != Aov::Bent) {
             let pixels = aov::render(&self.tracer, &self.camera_record(), self.size, control)?;
             channels.extend(aov::channels(&self.aov, &pixels, self.origin));
         }
         if Aov::Bent.is_in(&self.aov) {
             let bent = realtime.bent()?;
-            let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
-            channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
+            let axis = |(k, name): (usize, &str)| Channel::from_floats(name, bent.iter().map(|b| b[k]).collect());
+            channels.extend(["bent.X", "bent.Y", "bent.Z"].into_iter().enumerate().map(axis));
         }
         let number = self.report.frames.last().map_or(self.range.first, |f| f.number);
         let of_frame = [("camera", camera_text(&self.last_camera)), ("frame", number.to_string()), ("spp", spp)];
@@ -291,7 +301,7 @@ impl Frames<'_> {
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
     }
 
-    /// What pictures show of an image of [`Frames::image`], linear: radiance is tone mapped.
+    /// The linear picture of an image of [`Frames::image`]: radiance is tone mapped.
     pub fn picture(&self, image: &Image) -> Image {
         if !self.realtime.is_radiance() {
             return image.clone();
@@ -301,7 +311,8 @@ impl Frames<'_> {
         shown
     }
 
-    /// Coverage of the last frame: the fraction of each pixel that shows the scene, rows from the top; without antialiasing 1 where its centre does, else 0.
+    /// Coverage of the last frame, rows from the top: the fraction of each pixel that shows the
+    /// scene; without antialiasing 1 where its centre does, else 0.
     ///
     /// # Errors
     /// Those of the device.
@@ -319,7 +330,7 @@ impl Frames<'_> {
         CameraRecord::new(&self.last_camera, self.origin, self.aspect())
     }
 
-    /// The last frame in device memory, 8-bit RGBA, rows from the top; `None` if it is not displayed.
+    /// The last frame in device memory, 8-bit RGBA, rows from the top; `None` if not displayed.
     pub fn displayed(&self) -> Option<&Buffer> {
         self.realtime.displayed()
     }
@@ -341,27 +352,27 @@ impl Frames<'_> {
 /// [`Error::Usage`] for settings that have no effect together.
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let is_radiance = !is_ambient_occlusion(settings.integrator());
-    let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
+    let mut out = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
-    // buffers of surfaces are looked at with one place in each pixel; bent normals are not averaged over places
+    // of buffers each pixel has one place; bent normals are not averaged over several
     let shows_buffers = shown != DisplayMode::Result || Aov::Bent.is_in(&settings.image.aov);
     if settings.frames.antialias.is_none() {
         // without it edges of bright surfaces flicker
-        how.antialias =
-            how.history > 1 && !shows_buffers && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
+        out.antialias =
+            out.history > 1 && !shows_buffers && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
     }
     if is_radiance {
-        how.check_radiance()?;
-        how.rest_rr_depth = settings.integrators.path.rr_depth.unwrap_or(how.rest_rr_depth);
+        out.check_radiance()?;
+        out.rest_rr_depth = settings.integrators.path.rr_depth.unwrap_or(out.rest_rr_depth);
     }
-    how.converge |= settings.frames.at_rest.is_none() && (is_radiance || how.antialias);
-    how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
-    how.check()?;
-    shown.check(&how)?;
+    out.converge |= settings.frames.at_rest.is_none() && (is_radiance || out.antialias);
+    out.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
+    out.check()?;
+    shown.check(&out)?;
     if is_radiance {
         shown.check_radiance()?;
     }
-    Ok(how)
+    Ok(out)
 }
 
 /// The channels of a frame's value: `Y`, or `R`, `G` and `B`.
@@ -371,8 +382,8 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
 pub(super) fn colour_channels(realtime: &Realtime) -> Result<Vec<Channel>> {
     let (values, n) = (realtime.result()?, realtime.channels());
     let names: &[&str] = if n == 1 { &["Y"] } else { &["R", "G", "B"] };
-    let plane = |c: usize| Samples::F32(values.iter().skip(c).step_by(n).copied().collect());
-    Ok(names.iter().enumerate().map(|(c, name)| Channel { name: (*name).into(), samples: plane(c) }).collect())
+    let plane = |c: usize| values.iter().skip(c).step_by(n).copied().collect();
+    Ok(names.iter().enumerate().map(|(c, name)| Channel::from_floats(*name, plane(c))).collect())
 }
 
 /// Returns true if frames of the integrator are ambient occlusion, and not radiance.
@@ -381,20 +392,23 @@ pub fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
 }
 
 /// Scene data that frames with these settings need.
-pub fn frame_needs(settings: &RenderSettings, how: &Settings) -> Needs {
+pub fn frame_needs(settings: &RenderSettings, realtime_settings: &Settings) -> Needs {
     let integrator = settings.integrator();
-    let needs = match is_ambient_occlusion(integrator) {
-        true => Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() },
-        false => integrator.get().needs(&settings.integrators),
+    let needs = if is_ambient_occlusion(integrator) {
+        Needs { normals: realtime_settings.hemisphere == Hemisphere::Shading, ..Default::default() }
+    } else {
+        integrator.get().needs(&settings.integrators)
     };
     aov_needs(needs, &settings.image.aov)
 }
 
-/// Streams that frames with these settings trace, as far as they are known before the scene is looked at.
-pub fn frame_streams(settings: &RenderSettings, how: &Settings) -> Vec<&'static StreamShaders> {
-    match is_ambient_occlusion(settings.integrator()) {
-        true => Realtime::streams(how).to_vec(),
-        false => settings.integrator().get().streams(&settings.integrators),
+/// Streams that frames with these settings trace, as far as they are known without the scene.
+pub fn frame_streams(settings: &RenderSettings, realtime_settings: &Settings) -> Vec<&'static StreamShaders> {
+    let integrator = settings.integrator();
+    if is_ambient_occlusion(integrator) {
+        Realtime::streams(realtime_settings).to_vec()
+    } else {
+        integrator.get().streams(&settings.integrators)
     }
 }
 
@@ -407,13 +421,13 @@ pub fn frame_path_options(
     scene: &Scene,
     camera: &Camera,
     size: [u32; 2],
-    how: &Settings,
+    realtime_settings: &Settings,
 ) -> Result<Option<PathOptions>> {
     if is_ambient_occlusion(settings.integrator()) {
         return Ok(None);
     }
     let mut job = settings.job(scene, camera);
-    (job.samples.size, job.samples.spp) = (size, how.rays_per_pixel);
+    (job.samples.size, job.samples.spp) = (size, realtime_settings.rays_per_pixel);
     let options = settings.integrator().get().path_options(&job)?;
     let rr_depth = settings.integrators.path.rr_depth.unwrap_or(settings.frames.preset.unwrap_or_default().rr_depth());
     Ok(options.map(|options| PathOptions { rr_depth, ..options }))
@@ -427,16 +441,16 @@ pub fn pipeline(
     tracer: &Tracer,
     flat: &FlatScene,
     size: [u32; 2],
-    how: &Settings,
+    realtime_settings: &Settings,
     paths: Option<&PathOptions>,
 ) -> Result<Realtime> {
     match paths {
-        Some(paths) => Realtime::radiance(tracer, flat, size, how, paths),
-        None => Realtime::new(tracer, size, how, &point_lights(flat.scene, flat)),
+        Some(paths) => Realtime::radiance(tracer, flat, size, realtime_settings, paths),
+        None => Realtime::new(tracer, size, realtime_settings, &point_lights(flat.scene, flat)),
     }
 }
 
-/// What frames with these settings display.
+/// The display of frames with these settings.
 pub(super) fn frame_display(settings: &RenderSettings, scene: &Scene) -> Display {
     let PictureOptions { tone_map, exposure } = settings.picture.options();
     let shown = settings.frames.show.unwrap_or_default();
@@ -454,15 +468,6 @@ fn frames_of_history(settings: &Settings) -> u32 {
         Technique::Larsen => 4,
         _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
     }
-}
-
-/// Mean over covered pixels and `channels` channels, which are interleaved.
-fn covered_mean(values: &[f32], channels: usize, coverage: &[f32]) -> f64 {
-    let covered: f64 = coverage.iter().map(|&x| f64::from(x)).sum();
-    let shows = |pixel: usize| coverage[pixel] > 0.0;
-    let values = values.iter().enumerate().filter(|(k, _)| shows(k / channels));
-    let sum: f64 = values.map(|(_, &x)| f64::from(x)).sum();
-    if covered > 0.0 { sum / (covered * channels as f64) } else { 0.0 }
 }
 
 /// Diagonal of the scene's bounds, scene units; 1 for an empty scene.

@@ -6,10 +6,10 @@ use crate::gpu;
 
 /// Name of the part that is compiling pipelines.
 const COMPILE: &str = "compile";
-/// Name of the part in which settings are completed: what a scene looks like to a few thousand rays, by which its camera, AO radius and light are chosen.
+/// Name of the part in which settings are completed by a few thousand rays.
 pub(super) const SURVEY: &str = "survey";
 
-/// A stopwatch whose laps are the parts of a run. What the driver takes to compile pipelines is a part of its own, whichever lap it is in.
+/// A stopwatch whose laps are the parts of a run; compiling pipelines is a part of its own.
 #[derive(Clone, Debug)]
 pub struct Laps {
     last: Instant,

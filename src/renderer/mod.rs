@@ -1,7 +1,8 @@
-//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were compiled, behind two functions: [`Renderer::still`] and
-//! [`Renderer::frames`].
+//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were
+//! compiled, behind two functions: [`Renderer::still`] and [`Renderer::frames`].
 //!
-//! Later calls reuse what earlier ones have built: the tracer, if the settings need the same scene data, and all pipelines.
+//! Later calls reuse what earlier ones have built: the tracer, if the settings need the same scene
+//! data, and all pipelines.
 //!
 //! ```
 //! use skylit::film::NoControl;
@@ -106,7 +107,7 @@ struct Lighting {
 }
 
 impl Renderer {
-    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts: on small scenes they take equally long.
+    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts.
     ///
     /// # Errors
     /// Those of [`load::load`] and [`Device::open`].
@@ -114,10 +115,7 @@ impl Renderer {
         Self::open_with(scene, &LoadOptions::default(), settings)
     }
 
-    /// As [`Renderer::open`], with options of loading.
-    ///
-    /// # Errors
-    /// As [`Renderer::open`].
+    /// As [`Renderer::open`], errors included, with options of loading.
     pub fn open_with(scene: &str, options: &LoadOptions, settings: &DeviceSettings) -> Result<Self> {
         let timed = |start: Instant| start.elapsed().as_secs_f64();
         let open = Instant::now();
@@ -164,7 +162,7 @@ impl Renderer {
         })
     }
 
-    /// The same renderer with this name of its scene, a file or `builtin:NAME`, in metadata and messages.
+    /// Names the scene, a file or `builtin:NAME`, in metadata and messages.
     pub fn with_name(mut self, name: &str) -> Self {
         name.clone_into(&mut self.name);
         self
@@ -197,7 +195,7 @@ impl Renderer {
         (self.kind, &self.kind_reason)
     }
 
-    /// Renders an image: a still, or the last of the real-time frames, whichever the settings describe.
+    /// Renders an image: a still, or the last of the real-time frames, as the settings describe.
     ///
     /// # Errors
     /// Those of [`Renderer::still`] and [`Renderer::frames`].
@@ -222,7 +220,8 @@ impl Renderer {
         frames.image(control)
     }
 
-    /// Returns true if images of these settings show an environment, or a light infinitely far away, where no surface is: then they have no background of their own.
+    /// Returns true if images of these settings show an environment, or a light infinitely far
+    /// away, where no surface is: then they have no background of their own.
     ///
     /// # Errors
     /// Those of lights and environments that cannot be read.
@@ -237,7 +236,7 @@ impl Renderer {
         self.device.save_pipeline_cache();
     }
 
-    /// Applies settings of what the scene's file leaves open. The traced scene is built anew if that changes it.
+    /// Applies settings that the scene's file leaves open; a change of them builds the tracer anew.
     pub(crate) fn apply_scene_settings(&mut self, settings: &SceneSettings) {
         if settings.apply(&mut self.scene) {
             // the traced scene changes

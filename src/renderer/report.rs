@@ -1,4 +1,4 @@
-//! Reports of a render: lines for people, a JSON record for programs. Stills and frames share the parts that they have in common.
+//! Reports of a render: lines for people, a JSON record for programs.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::scene::{Camera, RenderHints};
 use crate::settings::Capability;
 use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 
-/// Seconds of a run. Those of its parts add up to the total; the others lie within them, and loading and starting the device overlap.
+/// Seconds of a run. Its parts add up to the total; the others lie within them, and may overlap.
 #[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Seconds {
     /// Loading the scene.
@@ -47,7 +47,7 @@ fn as_map<S: serde::Serializer>(parts: &[(&'static str, f64)], serializer: S) ->
 }
 
 impl Seconds {
-    /// Ends the run: `write` seconds of writing files were its last part, and `total` is the time of all. What no part accounts for is the part `other`.
+    /// Ends the run of `total` seconds with `write` seconds of files; the part `other` is the rest.
     pub fn finish(&mut self, write: f64, total: f64) {
         (self.write, self.total) = (write, total);
         self.parts.push(("write", write));
@@ -69,9 +69,9 @@ pub struct Setup {
     pub degenerate_triangles: usize,
     /// The camera in words.
     pub camera: String,
-    /// What settings left open and the scene decided, a sentence each.
+    /// Choices that settings left to the scene, a sentence each.
     pub choices: Vec<String>,
-    /// The same as options of `skylit render`; `None` if nothing was left open.
+    /// These choices as options of `skylit render`; `None` if nothing was left open.
     pub chosen: Option<String>,
     /// The camera in numbers ([`camera_numbers::pose`]).
     pub camera_pose: Value,
@@ -174,7 +174,7 @@ pub struct FilmReport {
 }
 
 impl FilmReport {
-    /// The report of a film with at most `spp` samples per pixel, which had `before` when it was resumed.
+    /// The report of a film of at most `spp` samples per pixel, which had `before` when resumed.
     pub(super) fn new(options: &FilmSettings, hints: &RenderHints, image: &Accumulated, before: Option<u32>, spp: u32) -> Self {
         let (min, mean, max) = image.film.samples_range();
         let estimated = image.film.estimated_rmse();
@@ -206,7 +206,7 @@ impl FilmReport {
     }
 }
 
-/// A standard error behind its value; nothing where there is no estimate, as with one sample per pixel.
+/// A standard error behind its value; empty without an estimate, as with one sample per pixel.
 fn error_text(error: f64) -> String {
     match error {
         e if e >= 0.000_1 => format!(" +- {e:.5}"),
@@ -240,7 +240,7 @@ pub struct StillReport {
     pub mean: f64,
     /// Standard error of the mean, from the variances of pixels.
     pub mean_standard_error: f64,
-    /// Mean of the pixels that show nothing but surfaces, luminance for colours; `None` if there are none.
+    /// Mean of the pixels that show surfaces alone, luminance for colours; `None` without any.
     pub surface_mean: Option<f64>,
     /// Report of the film.
     pub film: FilmReport,
@@ -265,7 +265,7 @@ pub struct StillReport {
 }
 
 impl StillReport {
-    /// Lines for people. `outputs`: names of the image files; `explain`: add lines about skipped work.
+    /// Lines for people. `outputs` names the image files; `explain` adds lines about skipped work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let [width, height] = self.size;
         let mut lines = vec![format!(
@@ -292,7 +292,7 @@ impl StillReport {
         lines
     }
 
-    /// What was skipped, and what that saved.
+    /// Lines about skipped work and its savings.
     fn explanations(&self) -> Vec<String> {
         let mut lines = vec![format!("tracer {}: {}", self.setup.tracer, self.setup.tracer_reason)];
         if let (Some(ComputeOptions { kernel, triangle_test }), Some(camera)) = (self.compute, self.coherent_kernel) {
@@ -366,7 +366,7 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
-    /// Nothing was to be done: the image had converged, and neither the camera nor the scene had moved.
+    /// Returns true if the image had converged, and neither camera nor scene had moved.
     pub fn is_skipped(&self) -> bool {
         self.stats.timings.is_empty() && self.stats.primary_rays + self.stats.occlusion_rays == 0
     }
@@ -418,8 +418,8 @@ pub struct FramesReport {
 }
 
 impl FramesReport {
-    /// Median and 95th percentile of the milliseconds of each pass, over the frames that run it. The first frame, in which some drivers compile shaders, is
-    /// ignored unless it is the only one.
+    /// Median and 95th percentile of the milliseconds of each pass, over the frames that run it.
+    /// The first frame, in which some drivers compile shaders, only counts if it is the only one.
     fn passes(&self) -> Vec<(&'static str, f64, f64)> {
         let from = usize::from(self.frames.len() > 1);
         let mut labels: Vec<&'static str> = Vec::new();
@@ -442,7 +442,7 @@ impl FramesReport {
         out
     }
 
-    /// Median and 95th percentile of the milliseconds per frame. Frames in which nothing was to be done, because the image had converged, do not count unless all are of them.
+    /// Median and 95th percentile of the milliseconds per frame, without skipped ones if possible.
     pub fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
         let of = |frames: &mut dyn Iterator<Item = &FrameReport>| -> Vec<f64> { frames.map(|f| 1e3 * f.seconds).collect() };
@@ -515,13 +515,11 @@ impl FramesReport {
 
     /// The integrator, with the technique of ambient occlusion.
     fn technique_text(&self) -> String {
-        match self.is_radiance() {
-            true => self.integrator.name().to_owned(),
-            false => format!("{} ({})", self.integrator.name(), self.settings.technique),
-        }
+        let name = self.integrator.name();
+        if self.is_radiance() { name.to_owned() } else { format!("{name} ({})", self.settings.technique) }
     }
 
-    /// What was skipped, and what that saved.
+    /// Lines about skipped work and its savings.
     fn explanations(&self) -> Vec<String> {
         let mut lines = self.setup.features.clone();
         lines.push(format!("tracer {}: {}", self.setup.tracer, self.setup.tracer_reason));

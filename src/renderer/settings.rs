@@ -1,4 +1,4 @@
-//! All settings of a render. The same structs are the command line of `skylit render`, the metadata of images, and settings files.
+//! All settings of a render: command line of `skylit render`, metadata of images, and files.
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub const DEFAULT_FOV_Y: f64 = 45.0;
 /// Integrators whose images can be denoised.
 const DENOISED: AppliesTo = AppliesTo::stills_of(Capability::Denoising);
 /// Integrators to whose images tone mapping and exposure apply.
-const TONE_MAPPED: AppliesTo = AppliesTo::of(Capability::ToneMapping);
+const TONE_MAPPED: AppliesTo = AppliesTo::all_of(Capability::ToneMapping);
 
 settings! {
     /// The image.
@@ -125,7 +125,8 @@ impl CameraSettings {
         Ok(())
     }
 
-    /// The camera for images of `aspect` = width / height that is chosen by what it would see, because the settings and the scene leave it open, or name a view; else `None`.
+    /// The camera for images of `aspect` = width / height that is chosen by what it would see,
+    /// because settings and scene leave it open, or name a view; else `None`.
     ///
     /// # Errors
     /// [`Error::Scene`] if the scene has no geometry.
@@ -134,7 +135,7 @@ impl CameraSettings {
         let is_automatic = self.eye.is_none() && self.camera.is_none() && survey.scene().cameras.is_empty();
         match self.view {
             Some(name) => framing::named(survey, name, aspect, fov_y).map(Some),
-            None if is_automatic => framing::of_scene(survey, aspect, fov_y).map(Some),
+            None if is_automatic => framing::choose_on_host(survey, aspect, fov_y).map(Some),
             None => Ok(None),
         }
     }
@@ -148,10 +149,10 @@ impl CameraSettings {
         }
     }
 
-    /// Chooses the camera for images of `aspect` = width / height, by what it would see where the settings and the scene leave it open.
+    /// Chooses the camera for images of `aspect` = width / height.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] if the scene has neither a camera nor geometry.
+    /// [`Error::Usage`] for a camera that does not exist, [`Error::Scene`] without any geometry.
     pub fn choose(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
         let camera = self.choose_unclipped(survey, aspect)?;
         Ok(Camera { clip: self.clip.unwrap_or(camera.clip), ..camera })
@@ -232,8 +233,8 @@ impl FilmSettings {
 /// Aspect ratios from which image sizes follow: others are mistakes.
 const ASPECTS: std::ops::RangeInclusive<f64> = 1.0 / 64.0..=64.0;
 
-/// The image size of an aspect ratio (width over height) with about as many pixels as [`DEFAULT_SIZE`], within three per cent of a side as close to the ratio as whole numbers come;
-/// `None` for a ratio that no image has.
+/// The image size of an aspect ratio (width over height) with about as many pixels as
+/// [`DEFAULT_SIZE`], within three per cent of a side; `None` for a ratio that no image has.
 pub fn size_of_aspect(aspect: f64) -> Option<[u32; 2]> {
     let pixels = DEFAULT_SIZE.iter().map(|&n| f64::from(n)).product::<f64>();
     let height = ASPECTS.contains(&aspect).then(|| (pixels / aspect).sqrt())?;
@@ -251,7 +252,7 @@ pub fn size_of_aspect(aspect: f64) -> Option<[u32; 2]> {
     Some(best.map(|n| n.max(1.0) as u32))
 }
 
-/// Settings as options of `skylit render`, quoted as a shell needs them, with numbers as people write them: `2`, not `2.0`.
+/// Settings as options of `skylit render`, quoted for a shell, with numbers like `2`, not `2.0`.
 pub fn options_text(settings: &RenderSettings) -> String {
     let short = |flag: String| {
         let numbers: Option<Vec<f64>> = flag.split(',').map(|n| n.parse().ok()).collect();
@@ -270,7 +271,7 @@ fn number_text(x: f64) -> String {
     if plain.len() > 12 { Some(format!("{x:e}")).filter(|text| text.len() < plain.len()).unwrap_or(plain) } else { plain }
 }
 
-/// Values of an option of the command line, one for each time that it is given; `None` for an option without a value.
+/// Values of an option for each time that it is given; `None` for one without a value.
 fn flag_values(name: &str, value: &serde_json::Value) -> Vec<Option<String>> {
     use serde_json::Value;
     let text = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
@@ -333,8 +334,9 @@ impl RenderSettings {
         serde_json::from_slice(&files::read(path)?).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
-    /// Reads what a person writes in a line: the name of an integrator or of a preset of frames in real time, then options of `skylit render`, with `'` or `"` around
-    /// what has spaces: `ao --ao-radius 2 --spp 64`, `balanced --frames 8`. `--settings FILE` reads a file, too.
+    /// Reads a line of a person: the name of an integrator or of a preset of frames in real time,
+    /// then options of `skylit render`, with `'` or `"` around spaces: `ao --ao-radius 2 --spp 64`,
+    /// `balanced --frames 8`. `--settings FILE` reads a file, too.
     ///
     /// # Errors
     /// [`Error::Usage`], naming the line, and those of [`RenderSettings::load`].
@@ -389,7 +391,7 @@ impl RenderSettings {
         out
     }
 
-    /// These settings without those that `other` replaces by giving others: a camera, its motion and an environment are replaced as a whole.
+    /// These settings without those that `other` gives; cameras, motion and environments go whole.
     pub(super) fn without_replaced(&self, other: &Self) -> Self {
         let mut out = self.clone();
         let (camera, motion) = (&other.camera, &other.frames);
@@ -446,15 +448,12 @@ impl RenderSettings {
         .concat()
     }
 
-    /// The first setting given that only real-time frames have, if any: its presence selects real-time frames.
+    /// The first given setting that only real-time frames have, which selects them.
     pub fn realtime_setting(&self) -> Option<GivenSetting> {
-        match self.is_still_sequence() {
-            true => None,
-            false => self.frames.given().into_iter().next(),
-        }
+        if self.is_still_sequence() { None } else { self.frames.given().into_iter().next() }
     }
 
-    /// Returns true if they describe stills, one for each frame of a time line: samples per pixel, and no setting that only frames in real time have.
+    /// Returns true for stills, one per frame: `spp`, and nothing that only real-time frames have.
     pub fn is_still_sequence(&self) -> bool {
         let given = self.frames.given();
         self.image.spp.is_some() && !given.is_empty() && given.iter().all(|s| s.applies.stills)
@@ -495,7 +494,7 @@ impl RenderSettings {
         all
     }
 
-    /// Clears settings that would have no effect, as far as editors can ([`crate::settings::Value::Other`] stays).
+    /// Clears settings without effect, but [`crate::settings::Value::Other`], which editors lack.
     pub fn clear_unused(&mut self) {
         let name = self.integrator();
         let integrator = (name.name(), name.get().capabilities());
@@ -533,7 +532,7 @@ impl RenderSettings {
         flags
     }
 
-    /// Image size in pixels, of a scene; without one of its own, whatever its camera's aspect ratio ([`size_of_aspect`]).
+    /// Image size in pixels: the settings' own, the scene's, or by the camera ([`size_of_aspect`]).
     pub fn size(&self, scene: &Scene) -> [u32; 2] {
         self.image.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE)
     }
@@ -553,7 +552,7 @@ impl RenderSettings {
         self.image.seed.unwrap_or_default()
     }
 
-    /// What a still of these settings is: all of its samples in one go.
+    /// The job of a still of these settings, with all of its samples.
     pub(super) fn job<'a>(&'a self, scene: &'a Scene, camera: &'a Camera) -> RenderJob<'a> {
         RenderJob {
             scene,

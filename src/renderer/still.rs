@@ -22,7 +22,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
-use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
+use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
 use crate::tracer::{Needs, Tracer};
@@ -34,7 +34,7 @@ pub struct StillExtras {
     pub keep_rays: bool,
     /// Render auxiliary outputs even if settings name none, for a depth image.
     pub aov: bool,
-    /// Make intermediate images at every power of two of samples even if settings do not select them, for viewers.
+    /// Make intermediate images at powers of two of samples whatever the settings, for viewers.
     pub intermediate: bool,
 }
 
@@ -44,7 +44,7 @@ pub struct Still {
     pub image: Image,
     /// Auxiliary outputs, rows from the top, if requested.
     pub aov: Vec<AovPixel>,
-    /// Camera rays and occlusion rays of the first sample in world space, if [`StillExtras::keep_rays`] is set.
+    /// World-space camera and occlusion rays of the first sample, with [`StillExtras::keep_rays`].
     pub rays: [Vec<Ray>; 2],
     /// The report of the render.
     pub report: StillReport,
@@ -53,18 +53,15 @@ pub struct Still {
 }
 
 impl Still {
-    /// Writes the image in the format of the file name's extension.
-    ///
-    /// # Errors
-    /// Those of [`Still::save_with`].
+    /// As [`Still::save_with`], errors included, with default settings of the file.
     pub fn save(&self, path: &Path) -> Result<()> {
         self.save_with(path, &FileSettings::default())
     }
 
-    /// As [`Still::save`], with settings of the file; those of other formats are ignored.
+    /// Writes the image in the format of the extension; settings of other formats are ignored.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown format, or one that cannot have what the settings say; [`Error::Output`].
+    /// [`Error::Usage`] for an unknown format, or settings that it lacks; [`Error::Output`].
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
         save(&self.image, self.integrator, &self.picture, files, path)
     }
@@ -81,10 +78,7 @@ pub struct IntermediateImage<'a> {
 }
 
 impl IntermediateImage<'_> {
-    /// Writes the image as [`Still::save_with`] does.
-    ///
-    /// # Errors
-    /// Those of [`Still::save_with`].
+    /// Writes the image as [`Still::save_with`] does, errors included.
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
         save(self.image, self.integrator, &self.picture, files, path)
     }
@@ -98,7 +92,7 @@ fn save(image: &Image, integrator: &dyn Integrator, options: &PictureOptions, fi
     let mut shown = match files.background {
         // the scene on black, as it is in the image
         None => integrator.picture(image, options),
-        // the scene alone: what a display shows of a colour is not in proportion to it, so that alpha comes afterwards
+        // the scene without its alpha, since displayed colours are not in proportion to linear ones
         Some(_) => integrator.picture(&picture::unassociated(image), options),
     };
     let alpha = image.channels.iter().find(|c| c.name == "A").filter(|_| shown.f32("A").is_none());
@@ -112,15 +106,13 @@ impl Renderer {
     /// Renders a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device; those of `control`.
+    /// [`Error::Usage`] for settings that do not fit; those of the device and of `control`.
     pub fn still(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Still> {
         self.still_with(settings, StillExtras::default(), control, &mut |_| Ok(()))
     }
 
-    /// As [`Renderer::still`]; `save` receives intermediate images, at the numbers of samples that [`super::settings::FilmSettings::intervals`] selects.
-    ///
-    /// # Errors
-    /// As [`Renderer::still`], and those of `save`.
+    /// As [`Renderer::still`]; `save`, whose errors are returned, receives intermediate images, at
+    /// the numbers of samples that [`super::settings::FilmSettings::intervals`] selects.
     pub fn still_with(
         &mut self,
         settings: &RenderSettings,
@@ -139,8 +131,7 @@ impl Renderer {
         self.still_of(&completed, extras, (start, laps), control, save)
     }
 
-    /// Renders a still of completed settings. `started`: when work on it began, and the parts of
-    /// its time so far.
+    /// Renders a still of completed settings. `started`: begin of the work, and its parts so far.
     pub(super) fn still_of(
         &mut self,
         completed: &Completed,
@@ -243,7 +234,7 @@ impl<'a> StillRender<'a> {
             rendered_by: [("tracer", renderer.kind.name().into()), ("device", format!("{} ({})", info.name, info.driver))],
             chosen: completed.options(),
             samples_before: None,
-            warnings: scene_warnings(scene),
+            warnings: scene.report.all_warnings(),
         }
     }
 
@@ -334,7 +325,7 @@ impl<'a> StillRender<'a> {
         let (integrator, job) = (self.integrator, &self.job);
 
         // warnings, of which those about brightness can be switched off
-        let surface_mean = brightness::of_surfaces(image, integrator.channels().len());
+        let surface_mean = brightness::surface_mean(image, integrator.channels().len());
         let exposure = f64::from(settings.picture.options().exposure);
         let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
         details.warnings.iter().for_each(|w| control.warning(w));
@@ -371,14 +362,6 @@ impl<'a> StillRender<'a> {
     }
 }
 
-/// Warnings of the scene's loader, a sentence each.
-pub(super) fn scene_warnings(scene: &crate::scene::Scene) -> Vec<String> {
-    let report = &scene.report;
-    let dropped =
-        (report.degenerate_triangles > 0).then(|| format!("dropped {} degenerate triangles", report.degenerate_triangles));
-    report.warnings.iter().cloned().chain(dropped).collect()
-}
-
 /// Description of a camera, for metadata.
 pub fn camera_text(camera: &Camera) -> String {
     let m = &camera.camera_to_world;
@@ -389,8 +372,7 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
-/// Everything that must agree for a render to be resumed: all that its samples depend on, except
-/// its size. `scene`: the scene's fingerprint, if the film's state is kept.
+/// All that must agree to resume a render. `scene`: its fingerprint, if the state is kept.
 pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Option<String>) -> Identity {
     let has_environment = scene.is_some() && integrator.sees_environment();
     let environment = has_environment.then(|| fingerprint::of_environment(&job.scene.environment));
@@ -406,12 +388,12 @@ pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, scene: Opti
     out
 }
 
-/// Numbers of samples at which intermediate images are saved: powers of two, and those that the scene names.
+/// Numbers of samples of intermediate images: powers of two, and those that the scene names.
 pub fn intervals(settings: &RenderSettings, hints: &RenderHints, spp: u32) -> Vec<u32> {
-    let mut intervals: Vec<u32> = match settings.film.intervals {
-        true => powers_of_two(spp).chain(hints.save_intervals.iter().copied()).collect(),
-        false => Vec::new(),
-    };
+    if !settings.film.intervals {
+        return Vec::new();
+    }
+    let mut intervals: Vec<u32> = powers_of_two(spp).chain(hints.save_intervals.iter().copied()).collect();
     intervals.retain(|&n| n > 0 && n < spp);
     intervals.sort_unstable();
     intervals.dedup();
@@ -449,8 +431,7 @@ struct Composer<'a> {
 }
 
 impl Composer<'_> {
-    /// Composes the image of a film: its channels, denoised where that is wanted, auxiliary outputs
-    /// and metadata.
+    /// Composes the image of a film: channels, denoised if wanted, auxiliary outputs and metadata.
     fn compose(&self, accumulated: &Accumulated, control: &mut dyn Control) -> Result<Image> {
         let mut channels = self.channels(accumulated);
         let mut metadata = self.metadata(accumulated);
@@ -463,18 +444,18 @@ impl Composer<'_> {
         Ok(Image { width, height, channels, metadata })
     }
 
-    /// The film as named channels: means, coverage, the variance of one sample of each channel, and the film's sums if its state is kept.
+    /// The film as named channels: means, coverage, the variance of a sample, and sums if kept.
     fn channels(&self, image: &Accumulated) -> Vec<Channel> {
         let (film, names) = (&image.film, self.render.integrator.channels());
-        let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
-        let mut out: Vec<_> = names.iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
-        out.push(f32s("A".into(), film.coverage.clone()));
+        let mean = |(c, name): (usize, &&str)| Channel::from_floats(*name, film.plane(c));
+        let mut out: Vec<_> = names.iter().enumerate().map(mean).collect();
+        out.push(Channel::from_floats("A", film.coverage.clone()));
         for (c, name) in names.iter().enumerate() {
-            let name = if names.len() == 1 { "variance".into() } else { format!("variance.{name}") };
-            out.push(f32s(name, film.variance_plane(c)));
+            let name = if names.len() == 1 { "variance".to_owned() } else { format!("variance.{name}") };
+            out.push(Channel::from_floats(name, film.variance_plane(c)));
         }
-        // exact: there are at most 2^24; floats, because frames in real time have fractions of samples
-        out.push(f32s("samples".into(), film.samples.iter().map(|n| *n as f32).collect()));
+        // exact, as there are at most 2^24; frames in real time have fractions of samples
+        out.push(Channel::from_floats("samples", film.samples.iter().map(|n| *n as f32).collect()));
         out.extend(image.state.iter().flat_map(|s| film_file::state_channels(s, names)));
         out
     }

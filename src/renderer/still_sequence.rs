@@ -1,4 +1,4 @@
-//! Stills of a scene and a camera over time, one for each frame, without history: what frames in real time approximate.
+//! Stills of a scene and a camera over time, which frames in real time approximate.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ use crate::scene::{Camera, Scene};
 /// Stills of a time line ([`Renderer::still_sequence`]).
 pub struct StillSequence<'r> {
     renderer: &'r mut Renderer,
-    /// Completed once, for the first frame, so that neither light nor the AO radius changes from frame to frame.
+    /// Completed once, for the first frame, so that neither light nor AO radius changes.
     completed: Completed,
     /// The camera without motion.
     camera: Camera,
@@ -81,7 +81,7 @@ impl StillSequence<'_> {
         self.range
     }
 
-    /// What settings left open and the scene decided, a sentence each.
+    /// Choices that settings left to the scene, a sentence each.
     pub fn choices(&self) -> &[String] {
         &self.completed.choices
     }
@@ -96,7 +96,8 @@ impl StillSequence<'_> {
         self.completed.settings.size(&self.renderer.scene)
     }
 
-    /// Returns true if an image is the finished frame of this number: of the same scene, camera and settings, by its metadata, and of as many samples.
+    /// Returns true if an image is the finished frame of this number: its metadata name the same
+    /// scene, camera and settings, and as many samples.
     ///
     /// # Errors
     /// Those of posing the scene.

@@ -77,6 +77,15 @@ pub struct LoadReport {
     pub tangents_computed: usize,
 }
 
+impl LoadReport {
+    /// Warnings for the user, a sentence each, about dropped triangles, too.
+    pub fn all_warnings(&self) -> Vec<String> {
+        let n = self.degenerate_triangles;
+        let dropped = (n > 0).then(|| format!("dropped {n} degenerate triangles"));
+        self.warnings.iter().cloned().chain(dropped).collect()
+    }
+}
+
 /// An extension that a glTF file names.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct FileExtension {

@@ -1,10 +1,9 @@
-//! The macro that declares named alternatives. build.rs includes this file, because some of them are
-//! numbers in shaders (`src/interface`); it has no use for what `cfg(library)` adds.
+//! The macro that declares named alternatives. build.rs includes this file, because some of them
+//! are numbers in shaders (`src/interface`); it does without what `cfg(library)` adds.
 
 /// Declares an enumeration of named values: `/// help` and `Variant = "name",` each.
 ///
-/// The first is the default unless another is named. The documentation of a variant is its help text on
-/// the command line.
+/// The first is the default unless another is named. A variant's documentation is its help text.
 macro_rules! choices {
     (
         $(#[$meta:meta])*

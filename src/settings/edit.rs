@@ -10,11 +10,11 @@ use super::{AppliesTo, Length};
 pub struct Setting<'a> {
     /// Name in files: `max_depth`.
     pub name: &'static str,
-    /// Its documentation, the help text of the command line.
+    /// Help text of the command line.
     pub help: &'static str,
-    /// What it has an effect on.
+    /// Integrators and images on which the setting has an effect.
     pub applies: AppliesTo,
-    /// Its value.
+    /// The value, to be changed in place.
     pub value: Value<'a>,
 }
 

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A length of the scene: `2.5`, `5%`, `inf`, `auto`. Files hold a number of scene units, or the text.
+/// A length of the scene: `2.5`, `5%`, `inf`, `auto`; in files also a number of scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
     /// Scene units, above 0; may be infinite.
@@ -17,7 +17,7 @@ pub enum Length {
 }
 
 impl Length {
-    /// Scene units; `None` for [`Length::Auto`]. `diagonal`: that of the scene's bounds, scene units.
+    /// Length in scene units, or `None` for [`Length::Auto`]. `diagonal`: of the scene's bounds.
     pub fn units(self, diagonal: f64) -> Option<f64> {
         match self {
             Self::Units(units) => Some(units),
@@ -35,7 +35,8 @@ impl FromStr for Length {
         if text == "auto" {
             return Ok(Self::Auto);
         }
-        let expected = "expected a length above 0 in scene units, a share of the scene's diagonal such as 5%, `inf` for no limit, or `auto`";
+        let expected = "expected a length above 0 in scene units, a share of the scene's diagonal such as 5%, \
+                        `inf` for no limit, or `auto`";
         let above_0 = |text: &str| text.trim().parse::<f64>().ok().filter(|v| *v > 0.0).ok_or(expected);
         match text.strip_suffix('%') {
             Some(percent) => {
@@ -51,7 +52,7 @@ impl fmt::Display for Length {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Units(units) => units.fmt(f),
-            // 0.07 * 100 is 7.000000000000001: what it was parsed from is the nearest with fewer digits
+            // rounded, because 0.07 * 100 is 7.000000000000001
             Self::OfDiagonal(share) => write!(f, "{}%", (share * 1e14).round() / 1e12),
             Self::Auto => f.write_str("auto"),
         }
@@ -90,7 +91,7 @@ mod tests {
 
     #[test]
     fn lengths_are_read_and_written() {
-        let of = |text: &str| text.parse::<Length>();
+        let parse = |text: &str| text.parse::<Length>();
         for (text, length) in [
             ("2.5", Length::Units(2.5)),
             ("inf", Length::Units(f64::INFINITY)),
@@ -100,13 +101,13 @@ mod tests {
             ("250%", Length::OfDiagonal(2.5)),
             ("auto", Length::Auto),
         ] {
-            assert_eq!(of(text), Ok(length), "{text}");
+            assert_eq!(parse(text), Ok(length), "{text}");
             assert_eq!(length.to_string(), text);
             let json = serde_json::to_string(&length).unwrap();
             assert_eq!(serde_json::from_str::<Length>(&json).unwrap(), length, "{json}");
         }
         for wrong in ["0", "-1", "nan", "0%", "inf%", "%", "", "5 %%", "Auto", "1m"] {
-            assert!(of(wrong).is_err(), "{wrong}");
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
         assert_eq!(serde_json::to_string(&Length::Units(2.0)).unwrap(), "2.0");
         assert!(serde_json::from_str::<Length>("-1").is_err());

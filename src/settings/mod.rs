@@ -1,7 +1,9 @@
-//! Declares settings: one struct is a part of the command line (with the feature `cli`), of settings files and of the JSON record.
+//! Declares settings: one struct is a part of the command line (with the feature `cli`), of
+//! settings files and of the JSON record.
 //!
-//! Each setting declares which integrators it applies to, by something that they can do ([`Capability`]), and whether it applies to stills, real-time frames, or both:
-//! [`check`] rejects settings without effect. So an integrator names its capabilities, and no setting names an integrator.
+//! Each setting names a [`Capability`] that an integrator needs for it, and whether it applies to
+//! stills, real-time frames, or both: [`check`] rejects settings without effect. So an integrator
+//! names its capabilities, and no setting names an integrator.
 
 mod choices;
 mod edit;
@@ -19,7 +21,7 @@ use crate::error::{Error, Result};
 pub enum Capability {
     /// It computes ambient occlusion of a radius and falloff.
     AmbientOcclusion,
-    /// Its values are ambient visibility, from 0 to 1, and no light.
+    /// Values are ambient visibility, from 0 to 1, and no light.
     AmbientVisibility,
     /// It renders frames in real time.
     RealTimeFrames,
@@ -31,19 +33,19 @@ pub enum Capability {
     GlobalIllumination,
     /// The length of its paths can be chosen.
     PathLength,
-    /// Its directions can be sampled by a strategy of choice.
+    /// Directions can be sampled by a strategy of choice.
     SamplingStrategy,
     /// It sees the environment and the lights of the scene.
     SceneLights,
-    /// Its only light is a white sky, its surfaces are grey.
+    /// The only light is a white sky, and surfaces are grey.
     WhiteSky,
     /// It reads textures.
     Textures,
-    /// Its camera has a pixel filter and a lens.
+    /// The camera has a pixel filter and a lens.
     CameraModel,
-    /// Its images are tone mapped.
+    /// Images are tone mapped.
     ToneMapping,
-    /// Its images can be denoised.
+    /// Images can be denoised.
     Denoising,
     /// It can keep the rays of the first sample.
     KeptRays,
@@ -55,7 +57,7 @@ pub type Integrator = (&'static str, &'static [Capability]);
 /// The integrators and kinds of output that a setting has an effect on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AppliesTo {
-    /// What an integrator must be capable of; `None`: any integrator will do.
+    /// The capability that an integrator needs; `None`: any integrator will do.
     pub capability: Option<Capability>,
     /// It applies to stills.
     pub stills: bool,
@@ -82,7 +84,7 @@ impl AppliesTo {
     }
 
     /// Stills and frames of the integrators that are capable of this.
-    pub const fn of(capability: Capability) -> Self {
+    pub const fn all_of(capability: Capability) -> Self {
         Self { capability: Some(capability), ..Self::ALL }
     }
 
@@ -133,7 +135,7 @@ impl Level {
 pub struct GivenSetting {
     /// Name in files: `max_depth`.
     pub name: &'static str,
-    /// What the setting has an effect on.
+    /// Integrators and images on which the setting has an effect.
     pub applies: AppliesTo,
 }
 
@@ -158,8 +160,8 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Checks that each of these settings has an effect on what `integrator` renders: real-time frames if `frames` is the setting that selects them, else a still. `all`: every
-/// integrator, to name those on which a setting would have an effect.
+/// Checks that each setting has an effect on what `integrator` renders: real-time frames if
+/// `frames` is the setting that selects them, else a still. Errors name others of `all`.
 ///
 /// # Errors
 /// [`Error::Usage`] for the first setting without effect.
@@ -185,8 +187,8 @@ pub fn check(given: &[GivenSetting], integrator: &Integrator, all: &[Integrator]
     Ok(())
 }
 
-/// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo), level;`, each with its documentation, which is its help text. The level is `basic`
-/// or `research`, or left out ([`Level`]).
+/// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo), level;`, each
+/// with its help text as documentation. The [`Level`] is `basic` or `research`, or left out.
 ///
 /// A setting is an `Option`, a `bool` or a `Vec`; the default value means that it was not given.
 macro_rules! settings {

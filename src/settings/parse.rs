@@ -9,7 +9,7 @@ use glam::DVec3;
 /// A value, or a description of what is expected.
 pub type Parsed<T> = std::result::Result<T, String>;
 
-/// What the parser of the command line says of wrong arguments, in one line.
+/// The message of clap about wrong arguments, in one line.
 #[cfg(feature = "cli")]
 pub fn usage_message(error: &clap::Error) -> String {
     let text = error.render().to_string();

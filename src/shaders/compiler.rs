@@ -1,5 +1,5 @@
-//! Compiles GLSL to SPIR-V, with a cache on disk. Used by build.rs, which compiles all shaders, and by programs that were built with the feature
-//! `live-shaders`, which compile shaders on demand.
+//! Compiles GLSL to SPIR-V, with a cache on disk: for build.rs, which compiles all shaders, and for
+//! the feature `live-shaders`, which compiles them on demand.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,8 +16,9 @@ use shaderc_libraries as _;
 
 use super::source::{Source, Stage};
 
-/// A cache of SPIR-V on disk, shared by all build profiles and later runs: files `KEY.spv` in the folder `target/spirv`. The key is a hash of the source with all
-/// includes, so that a change recompiles only the shaders that include it.
+/// A cache of SPIR-V on disk, shared by all build profiles and later runs: files `KEY.spv` in the
+/// folder `target/spirv`. The key is a hash of the source with all includes, so that a change
+/// recompiles only the shaders that include it.
 struct Cache {
     folder: PathBuf,
     // version of the compiler
@@ -27,7 +28,7 @@ struct Cache {
 /// Maximum number of cached shaders; the oldest are removed first.
 const MAX_ENTRIES: usize = 1500;
 
-/// Optimization takes three quarters of the compile time. Live shaders are not optimized here, for short edit cycles: the driver optimizes, too.
+/// Optimization takes three quarters of the compile time, so live shaders go without.
 fn optimization(source: &Source) -> OptimizationLevel {
     if cfg!(feature = "live-shaders") || !source.is_optimized() {
         OptimizationLevel::Zero
@@ -46,7 +47,7 @@ pub struct Compiler {
 
 /// A compiled shader.
 pub struct Compiled {
-    /// Its SPIR-V.
+    /// The SPIR-V, as bytes.
     pub spirv: Vec<u8>,
     /// The files that it includes.
     #[cfg_attr(feature = "live-shaders", allow(dead_code, reason = "build.rs alone tells cargo"))]
@@ -54,8 +55,8 @@ pub struct Compiled {
 }
 
 impl Compiler {
-    /// `shaders`: the folder. `interface`: generated files, by name. `out`: OUT_DIR, from which the folder of the cache follows. Without pkg-config, which tells
-    /// the compiler's version, there is no cache.
+    /// `shaders`: the folder. `interface`: generated files, by name. `out`: OUT_DIR, from which the
+    /// cache's folder follows. Without pkg-config, which tells the compiler's version, it has none.
     pub fn new(shaders: &Path, interface: Vec<(String, String)>, out: &Path) -> Self {
         Self { shaders: shaders.to_owned(), interface: interface.into_iter().collect(), cache: Cache::open(out) }
     }
@@ -92,7 +93,7 @@ impl Compiler {
         Ok(compiled)
     }
 
-    /// A key of a text with all its includes, of the kind of shader and how it is compiled; and the included files.
+    /// The key of a text with its includes, kind and options; and the included files.
     fn key(&self, text: &str, source: &Source) -> Option<(String, BTreeSet<PathBuf>)> {
         // two hashes of 64 bits
         let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
@@ -182,7 +183,8 @@ impl Cache {
         self.folder.join(format!("{key}{:016x}.spv", hash.finish()))
     }
 
-    /// Writes a temporary file and renames it, because other builds and programs may run at the same time. If it fails, the shader is compiled again next time.
+    /// Writes a temporary file and renames it, because other builds and programs may run at the
+    /// same time. If it fails, the shader is compiled again next time.
     fn store(path: &Path, spirv: &[u8]) {
         let temporary = path.with_extension(std::process::id().to_string());
         if std::fs::write(&temporary, spirv).is_err() || std::fs::rename(&temporary, path).is_err() {

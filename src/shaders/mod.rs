@@ -30,11 +30,10 @@ use crate::error::Result;
 static SPIRV: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/spirv.rs"));
 
 impl Shader {
-    /// Its SPIR-V.
+    /// SPIR-V that build.rs has compiled, or with `live-shaders` from the files as they are now.
     ///
     /// # Errors
-    /// None, except with the feature `live-shaders`: [`crate::Error::Usage`] with the compiler's
-    /// message.
+    /// None but with `live-shaders`: [`crate::Error::Usage`] with the compiler's message.
     ///
     /// # Panics
     /// If no list of `registry.rs` names the shader.
@@ -46,7 +45,7 @@ impl Shader {
         Ok(Cow::Borrowed(SPIRV[index].1))
     }
 
-    /// Its SPIR-V, compiled from the files as they are now.
+    /// SPIR-V, compiled from the files as they are now.
     ///
     /// # Errors
     /// [`crate::Error::Usage`] with the compiler's message.
@@ -130,9 +129,10 @@ mod tests {
     #[test]
     fn every_shader_is_spirv() {
         // a program that compiles shaders when it runs would take minutes for all
-        let shaders = match cfg!(feature = "live-shaders") {
-            true => vec![MISS, DRAW_SPHERE, RESOLVE.variant(true), RESOLVE.variant(false), wide_kernel(Mode::Any, true)],
-            false => list_shaders(),
+        let shaders = if cfg!(feature = "live-shaders") {
+            vec![MISS, DRAW_SPHERE, RESOLVE.variant(true), RESOLVE.variant(false), wide_kernel(Mode::Any, true)]
+        } else {
+            list_shaders()
         };
         for shader in &shaders {
             assert_eq!(shader.spirv().unwrap()[..4], 0x0723_0203u32.to_le_bytes(), "{}", shader.source());

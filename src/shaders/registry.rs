@@ -1,5 +1,5 @@
-//! All shaders. A pass is a static here, its name in the list below, and a file in shaders/. build.rs
-//! includes this file and compiles what the lists name.
+//! All shaders. A pass is a static here, its name in the list below, and a file in shaders/.
+//! build.rs includes this file and compiles what the lists name.
 
 use super::source::Mode::{self, Any, Closest};
 use super::source::Rays::{Camera, CameraOrKnown, Generated, Queue};
@@ -66,7 +66,6 @@ pub const STREAMS: &[&StreamShaders] = &[
 
 /// The mean over frames whose samples lie at different places within the pixels.
 pub static ANTIALIAS: ComputeShader = ComputeShader::new("antialias");
-/// A frame's occlusion rays, distributed over its pixels.
 /// Radiance of each pixel, of its filtered parts.
 pub static COMPOSE: ComputeShader = ComputeShader::new("compose");
 /// The spatial filter of radiance.

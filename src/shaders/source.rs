@@ -1,5 +1,4 @@
-//! Sources of shaders: a tracer's template and a pass make one text. Used by build.rs and by the
-//! program.
+//! Sources of shaders: a tracer's template and a pass make one text.
 
 use std::fmt;
 use std::path::Path;
@@ -8,12 +7,10 @@ use std::sync::OnceLock;
 /// Invocations per workgroup of a stream.
 pub const LANES: u32 = 64;
 
-/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work
-/// (shaders/trace/spread.glsl).
+/// Number of distant parts of a dispatch from which runs of workgroups take their work.
 pub const SPREAD: u32 = 16;
 
-/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory
-/// is prefetched.
+/// Consecutive workgroups that take neighbouring work, one ray per invocation each: a prefetch.
 pub const RUN: u32 = 4;
 
 /// Rays per invocation of a packet.
@@ -25,11 +22,10 @@ const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extensi
 /// Enables loads and stores of 64 bits, for devices with 64-bit integers.
 const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
 
-/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to
-/// a queue, or none.
+/// Enables subgroup ballots: one atomic operation for all invocations that append to a queue.
 const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
-/// What a stream finds for its rays.
+/// The answer that a stream gives to each of its rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Whether a ray is occluded.
@@ -62,8 +58,7 @@ pub enum Rays {
     /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility
     /// can be rasterized instead.
     Camera,
-    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory
-    /// (shaders/trace/known.glsl).
+    /// As [`Rays::Camera`]; or the hits are in memory (shaders/trace/known.glsl).
     CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,
@@ -95,11 +90,11 @@ pub enum Stage {
 pub enum Variant {
     /// Compute tracer: generates rays into memory.
     Generate,
-    /// The same for devices with 64-bit integers and subgroup ballots.
+    /// As [`Variant::Generate`], for devices with 64-bit integers and subgroup ballots.
     Generate64,
     /// Compute tracer: passes hits to the pass's callback.
     Deliver,
-    /// The same for devices with 64-bit integers and subgroup ballots.
+    /// As [`Variant::Deliver`], for devices with 64-bit integers and subgroup ballots.
     Deliver64,
     /// Compute tracer: traces the rays of a subgroup together.
     Packet,
@@ -115,7 +110,7 @@ pub enum Variant {
     Visibility,
     /// No tracer: reads the hits that another pass has found.
     Known,
-    /// The same for devices with 64-bit integers and subgroup ballots.
+    /// As [`Variant::Known`], for devices with 64-bit integers and subgroup ballots.
     Known64,
 }
 
@@ -173,8 +168,7 @@ impl Variant {
     }
 }
 
-/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of
-/// shaders/.
+/// Folder of the test shaders of the feature `probes`; they include files of shaders/.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub const PROBES: &str = "tests/shaders";
 
@@ -203,7 +197,7 @@ pub enum Source {
     Stream {
         /// File in shaders/, without its ending.
         pass: &'static str,
-        /// What its rays ask for.
+        /// The answer to each ray.
         mode: Mode,
         /// The template.
         variant: Variant,
@@ -217,7 +211,7 @@ pub enum Source {
     },
     /// The compute tracer's wide kernel, which contains no code of a stream.
     Kernel {
-        /// What rays ask for.
+        /// The answer to each ray.
         mode: Mode,
         /// For devices with 64-bit integers and subgroup ballots.
         ballot: bool,
@@ -226,7 +220,7 @@ pub enum Source {
     File {
         /// In shaders/.
         path: &'static str,
-        /// What it is.
+        /// Kind of the shader.
         stage: Stage,
     },
 }
@@ -252,12 +246,11 @@ impl Source {
         }
     }
 
-    /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops
+    /// Whether the SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops
     /// over a thread's four pixels in common/filter.glsl rolled up in a form that lavapipe's does
     /// not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by
-    /// itself, and filters take three times as long. So it is with the loops over neighbours of
-    /// `antialias`, which takes half as long without, and of the two that reproject histories
-    /// (three quarters).
+    /// itself, and filters take three times as long. So it is with the neighbours of `antialias`,
+    /// which takes half as long without, and of the two that reproject histories (three quarters).
     pub fn is_optimized(&self) -> bool {
         !matches!(
             self,
@@ -328,7 +321,7 @@ impl Shader {
         Self::new(Source::File { path, stage })
     }
 
-    /// Its source.
+    /// The source that the shader is compiled from.
     pub fn source(&self) -> &Source {
         &self.source
     }
@@ -338,7 +331,7 @@ impl Shader {
 pub struct StreamShaders {
     /// File in shaders/, without its ending; label of its timings if the stream is a single shader.
     pub pass: &'static str,
-    /// What it finds for each ray.
+    /// The answer to each ray.
     pub mode: Mode,
     /// Source of its rays.
     pub rays: Rays,
@@ -374,7 +367,7 @@ impl StreamShaders {
         })
     }
 
-    /// Its shader for a tracer and step; `None` where [`Variant::applies_to`] says so.
+    /// The shader for a tracer and step; `None` where [`Variant::applies_to`] says so.
     pub fn variant(&self, variant: Variant) -> Option<Shader> {
         let source = Source::Stream { pass: self.pass, mode: self.mode, variant };
         variant.applies_to(self.rays).then_some(Shader::new(source))
@@ -392,8 +385,7 @@ impl fmt::Debug for StreamShaders {
     }
 }
 
-/// A pass that traces no rays: a shader for devices with 64-bit integers, and one for those
-/// without.
+/// A pass that traces no rays: a shader for devices with 64-bit integers, and one for others.
 #[derive(Debug)]
 pub struct ComputeShader {
     /// File in shaders/, without its ending.

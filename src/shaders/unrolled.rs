@@ -1,5 +1,7 @@
-//! A rule of the shaders that no compiler checks: no `precise` arithmetic in loops that the optimizer unrolls. spirv-opt copies such a loop's body without its
-//! decorations `NoContraction`, so that in all copies but the first products are fused into sums: on GPUs, where Mesa's CPU driver fuses none.
+//! A rule of the shaders that no compiler checks: no `precise` arithmetic in loops that the
+//! optimizer unrolls. spirv-opt copies the body of such a loop without its decorations
+//! `NoContraction`, so that in all copies but the first products are fused into sums: on GPUs,
+//! where Mesa's CPU driver fuses none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,7 +37,7 @@ fn called(text: &str) -> impl Iterator<Item = &str> {
     calls.chain(words(text).filter(|w| *w == "precise"))
 }
 
-/// What the first bracket in `text` encloses, and what follows.
+/// The text that the first bracket in `text` encloses, and the rest.
 fn enclosed(text: &str, [open, close]: [char; 2]) -> (&str, &str) {
     let start = text.find(open).map_or(text.len(), |at| at + 1);
     let mut depth = 1;
@@ -70,8 +72,9 @@ fn define(text: &str, definitions: &mut Definitions) {
     }
 }
 
-/// Names of what computes precisely, by itself or through what it calls; but for whole numbers (common/integers.glsl), which are sums alone, and for the
-/// streams' callback `any`, which a function of GLSL is called like.
+/// Names of what computes precisely, by itself or through what it calls; but for whole numbers
+/// (common/integers.glsl), which are sums alone, and for the streams' callback `any`, which is
+/// named like a function of GLSL.
 fn precise_names(definitions: &Definitions) -> BTreeSet<&str> {
     let mut precise = BTreeSet::from(["precise"]);
     loop {

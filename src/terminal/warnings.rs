@@ -22,11 +22,3 @@ impl Warnings {
         self.list.push(line);
     }
 }
-
-/// The warnings of a scene's loader, one sentence each.
-pub fn warnings_of(scene: &crate::scene::Scene) -> Vec<String> {
-    let report = &scene.report;
-    let dropped =
-        (report.degenerate_triangles > 0).then(|| format!("dropped {} degenerate triangles", report.degenerate_triangles));
-    report.warnings.iter().cloned().chain(dropped).collect()
-}

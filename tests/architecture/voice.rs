@@ -98,7 +98,8 @@ fn documentation(text: &str, lapses: &mut Vec<String>) {
 }
 
 fn is_help(line: &str) -> bool {
-    line.starts_with("#[derive(") && line.split(|c: char| !c.is_alphanumeric()).any(|word| HELP.contains(&word))
+    let is_derive = line.starts_with("#[") && line.contains("derive(");
+    is_derive && line.split(|c: char| !c.is_alphanumeric()).any(|word| HELP.contains(&word))
 }
 
 /// Is this the documentation of a type whose text is help?

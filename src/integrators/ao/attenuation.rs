@@ -15,13 +15,14 @@ pub struct Attenuation {
 }
 
 impl Attenuation {
-    /// Length of occlusion rays of stills in scene units: the radius, or where the falloff leaves nothing that single precision could add to a sample.
+    /// Length of occlusion rays of stills in scene units: the radius, or where the falloff leaves
+    /// nothing that single precision could add to a sample.
     pub fn reach(self) -> f64 {
         self.distance_of(INSIGNIFICANT)
     }
 
-    /// Length of occlusion rays of frames in scene units: the radius, or where the falloff makes the occlusion of one hit invisible. The sum of what is left out may be visible
-    /// where all occluders are that far.
+    /// Length of occlusion rays of frames in scene units: the radius, or where the falloff makes
+    /// the occlusion of a hit invisible. The sum of many such hits may be visible.
     pub fn visible_reach(self) -> f64 {
         self.distance_of(INVISIBLE)
     }

@@ -1,8 +1,10 @@
-//! Ambient occlusion stills: the passes `primary`, `occlusion` and `resolve`, several samples of each pixel at a time.
+//! Ambient occlusion stills: the passes `primary`, `occlusion` and `resolve`, several samples of
+//! each pixel at a time.
 //!
-//! `primary` traces camera rays and appends an occlusion ray to a queue for each hit; `occlusion` traces the queue and writes the
-//! value of each sample; `resolve` adds the samples to the film, pixel by pixel and in order. So camera rays that miss cost
-//! nothing more, neighbouring occlusion rays belong to one pixel, and sums do not depend on launch sizes.
+//! `primary` traces camera rays and appends an occlusion ray to a queue for each hit; `occlusion`
+//! traces the queue and writes the value of each sample; `resolve` adds the samples to the film,
+//! pixel by pixel and in order. So camera rays that miss cost nothing more, neighbouring occlusion
+//! rays belong to one pixel, and sums do not depend on launch sizes.
 
 mod attenuation;
 mod hemisphere;
@@ -127,7 +129,7 @@ impl Integrator for AmbientOcclusion {
         2
     }
 
-    /// Not if rays are dumped: a dump must hold the rays of all pixels. Not if pixels see beyond their area.
+    /// Not if rays are kept, which must be those of all pixels, or if pixels see beyond their area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
         !job.samples.keep_rays && job.samples.pixel_filter.is_within_pixel()
     }
@@ -207,10 +209,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         has_entry_points: false,
         resolve: shaders::RESOLVE.pipeline(device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
-        dumps: match samples.keep_rays {
-            true => Some([ray_buffer(device, most)?, ray_buffer(device, most)?]),
-            false => None,
-        },
+        dumps: if samples.keep_rays { Some([ray_buffer(device, most)?, ray_buffer(device, most)?]) } else { None },
         kept: Default::default(),
     };
     let params = estimator.rays.params(BlockParams {

@@ -1,4 +1,4 @@
-//! The rays of samples of ambient occlusion: camera rays, and from where they meet the scene occlusion rays (`primary`, `occlusion`).
+//! The rays of samples of ambient occlusion: camera rays, and occlusion rays from their hits.
 
 use super::{Attenuation, NO_HIT};
 use crate::error::Result;
@@ -42,12 +42,13 @@ impl AoRays {
         })
     }
 
-    /// Device address of the launch's samples: ambient visibility, a float each; negative where the camera ray missed.
+    /// Device address of a float per sample: ambient visibility, or negative for a miss.
     pub fn samples(&self) -> u64 {
         self.samples.address()
     }
 
-    /// Returns true if camera rays start below the root of the hierarchy, in launches of enough samples: `params` are of [`AoRays::params`].
+    /// Returns true if camera rays start below the root of the hierarchy, in launches of enough
+    /// samples: `params` are of [`AoRays::params`].
     pub fn has_entry_points(&self, params: &BlockParams) -> bool {
         self.entry_points.is_some() && params.orthographic == 0
     }

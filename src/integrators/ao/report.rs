@@ -3,14 +3,14 @@
 use serde_json::{Value, json};
 
 use super::{AoOptions, AoResult};
-use crate::film::Film;
+use crate::film::covered_mean;
 use crate::integrators::IntegratorReport;
 use crate::interface::records::block::MAX_ENTRY_POINTS;
 
 /// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
     let image = &result.image;
-    let covered_mean = covered_mean(&image.film);
+    let covered_mean = covered_mean(&image.film.mean, 1, &image.film.coverage);
     let traced = image.primary_rays + result.occlusion_rays;
     let mrays_s = if image.trace_seconds > 0.0 { traced as f64 / image.trace_seconds / 1e6 } else { 0.0 };
     let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
@@ -30,10 +30,12 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         },
         "mrays_s_wall": mrays_s,
     });
-    let mut explanations = vec![match options.attenuation().is_binary() {
-        true => "binary occlusion: any-hit rays".into(),
-        false => "occlusion falls off with distance: closest-hit rays".into(),
-    }];
+
+    // Explanations of skipped work.
+    let is_binary = options.attenuation().is_binary();
+    let occlusion =
+        if is_binary { "binary occlusion: any-hit rays" } else { "occlusion falls off with distance: closest-hit rays" };
+    let mut explanations = vec![occlusion.to_owned()];
     explanations.push(match options.attenuation().reach() {
         r if r.is_finite() => {
             // four digits, however small the scene is
@@ -44,7 +46,8 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
     });
     if result.has_entry_points {
         explanations.push(format!(
-            "entry points: camera rays of 2x2 pixels start at up to {MAX_ENTRY_POINTS} blocks of the hierarchy, the levels above are skipped"
+            "entry points: camera rays of 2x2 pixels start at up to {MAX_ENTRY_POINTS} blocks of the hierarchy, \
+             the levels above are skipped"
         ));
     }
     let all = result.occlusion_rays + result.skipped_rays;
@@ -59,11 +62,4 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         record: record.as_object().cloned().unwrap_or_default(),
         warnings: Vec::new(),
     }
-}
-
-/// Mean over the samples that hit the scene.
-fn covered_mean(film: &Film) -> f64 {
-    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
-    let covered = sum(&film.coverage);
-    if covered > 0.0 { sum(&film.mean) / covered } else { 0.0 }
 }

@@ -6,7 +6,7 @@ use crate::settings::parse::parse_falloff;
 use crate::settings::{AppliesTo, Capability, Length, settings};
 
 /// Integrators that these settings apply to.
-const AO: AppliesTo = AppliesTo::of(Capability::AmbientOcclusion);
+const AO: AppliesTo = AppliesTo::all_of(Capability::AmbientOcclusion);
 
 settings! {
     /// Ambient occlusion.
@@ -25,7 +25,7 @@ settings! {
 }
 
 impl AoSettings {
-    /// AO radius in scene units; infinite for no limit, and as long as the scene has not been asked ([`crate::renderer::Renderer`] does).
+    /// AO radius in scene units; infinite for no limit, and before the scene has chosen one.
     pub fn radius(&self) -> f64 {
         match self.ao_radius {
             Some(Length::Units(units)) => units,

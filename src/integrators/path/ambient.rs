@@ -1,7 +1,9 @@
-//! Ambient light, as real-time renderers have it: the same radiance from everywhere, kept from surfaces by ambient occlusion.
+//! Ambient light, as real-time renderers have it: the same radiance from everywhere, kept from
+//! surfaces by ambient occlusion.
 //!
-//! Radiance towards the camera is then L = direct light + ambient * V * albedo, V the ambient visibility of a radius and falloff. [`trace`] traces the occlusion
-//! rays of an image once and returns the distances of their hits, by which V is known for every radius and falloff.
+//! Radiance towards the camera is then L = direct light + ambient * V * albedo, V the ambient
+//! visibility of a radius and falloff. [`trace`] traces the occlusion rays of an image once and
+//! returns the distances of their hits, by which V is known for every radius and falloff.
 
 use glam::Vec3;
 
@@ -24,14 +26,15 @@ use crate::tracer::{Push, Stream, Tracer};
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct AmbientSample {
-    /// Share of ambient light that the surface reflects towards the camera, linear RGB; 0 where the camera ray missed, and on surfaces that reflect no ambient
-    /// light.
+    /// Share of ambient light that the surface reflects towards the camera, linear RGB; 0 for
+    /// misses, and for surfaces that reflect no ambient light.
     pub reflectance: [f32; 3],
-    /// Distance of the occlusion ray's hit, scene units; infinite for a miss. Without a ray: 1 if the camera ray hit a surface, else 0.
+    /// Distance of the occlusion ray's hit, scene units; infinite for a miss. Without an occlusion
+    /// ray: 1 if the camera ray hit a surface, else 0.
     pub distance: f32,
 }
 
-/// Receives the samples of a pixel that were taken together: index of the pixel (rows from the top), and samples.
+/// Receives the index of a pixel (rows from the top), and samples that were taken together.
 pub type TakeSamples<'a> = dyn FnMut(usize, &[AmbientSample]) + 'a;
 
 /// Traces the occlusion rays of an image, to their nearest hits without a limit, and hands their
@@ -127,7 +130,7 @@ impl PathEstimator {
         })
     }
 
-    /// Reads what the samples of the last launch have left; `take` also receives the index of its first sample.
+    /// Reads the samples of the last launch; `take` also receives the index of its first sample.
     fn read_samples(&self, count: u32, mut take: impl FnMut(u32, &[AmbientSample])) -> Result<()> {
         let size = size_of::<AmbientSample>() as u64;
         // all samples of a pixel at once

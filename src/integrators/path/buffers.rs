@@ -1,5 +1,4 @@
-//! Device memory of the paths of a launch: their queues, states and contributions, and the
-//! parameters that lead shaders to them.
+//! Device memory of the paths of a launch, and the parameters that lead shaders to it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Environments in device memory: texels, and the table for importance sampling (shaders/path/map.glsl).
+//! Environments in device memory: texels, and the table that is sampled (shaders/path/map.glsl).
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub(super) struct DeviceEnvironment {
 }
 
 impl DeviceEnvironment {
-    /// Uploads the environment. `compensated`: build the sampling table with MIS compensation, which needs MIS with BSDF sampling.
+    /// Uploads the environment. `compensated`: use MIS compensation, which needs BSDF sampling.
     pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool) -> Result<Self> {
         let plain = |c: Vec3| Self { map: EnvironmentRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
         let map = match environment {
@@ -32,9 +32,9 @@ impl DeviceEnvironment {
             Environment::Map(map) => map,
         };
         let (width, height) = (map.width as usize, map.height as usize);
-        let totals = Totals::of(map);
+        let totals = Totals::from_map(map);
         let subtracted = if compensated { totals.compensation() } else { 0.0 };
-        // computed again where it is needed: the weights of all texels would be a gigabyte of a large map
+        // computed again where needed: the weights of all texels would be a gigabyte of a large map
         let weight = |c: &Vec3| weight(brightness(*c), subtracted);
         let distribution = BilinearDistribution::new(width, height, |y, out| {
             out.iter_mut().zip(&map.radiance[y * width..][..width]).for_each(|(w, c)| *w = weight(c));
@@ -65,12 +65,12 @@ pub(super) fn rows(m: &DMat3) -> [[f32; 4]; 3] {
     [0, 1, 2].map(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0])
 }
 
-/// What light samples go by: a texel's importance without what they leave to BSDF samples ([`Totals::compensation`]).
+/// Weight of a texel for light samples: importance that they do not leave to BSDF samples.
 fn weight(importance: f64, subtracted: f64) -> f64 {
     (importance - subtracted).max(0.0)
 }
 
-/// What is known of a map as a whole.
+/// Sums over a whole map.
 struct Totals {
     /// Radiance averaged over the sphere.
     mean_radiance: Vec3,
@@ -80,7 +80,7 @@ struct Totals {
 }
 
 impl Totals {
-    fn of(map: &EnvironmentMap) -> Self {
+    fn from_map(map: &EnvironmentMap) -> Self {
         let rows: Vec<[f64; 5]> = (map.radiance.par_chunks_exact(map.width as usize))
             .map(|row| {
                 row.iter().fold([0.0; 5], |[r, g, b, sum, most], c| {
@@ -100,8 +100,9 @@ impl Totals {
         Self { mean_radiance: Vec3::new(r as f32, g as f32, b as f32), mean, most }
     }
 
-    /// What light samples leave to BSDF samples of each texel's importance, the mean: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019, section 5).
-    /// Directions below it are left to BSDF sampling, which knows the surface. A constant map keeps its weights.
+    /// Importance of each texel that light samples leave to BSDF samples, which know the surface:
+    /// the mean, for "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia
+    /// 2019, section 5). A constant map keeps its weights.
     fn compensation(&self) -> f64 {
         if self.most > self.mean * 1.0001 { self.mean } else { 0.0 }
     }
@@ -125,7 +126,7 @@ mod tests {
     #[test]
     fn what_is_above_the_mean_is_left_to_light_samples() {
         let weights = |values: [f32; 4]| {
-            let subtracted = Totals::of(&map(2, &values.map(Vec3::splat))).compensation();
+            let subtracted = Totals::from_map(&map(2, &values.map(Vec3::splat))).compensation();
             values.map(|v| weight(brightness(Vec3::splat(v)), subtracted) as f32)
         };
         assert_eq!(weights([1.0, 1.0, 1.0, 9.0]), [0.0, 0.0, 0.0, 6.0]);
@@ -144,7 +145,7 @@ mod tests {
         let map = map(2, &radiance);
         let share = (0.375f64 * std::f64::consts::PI).sin()
             / ((0.125f64 * std::f64::consts::PI).sin() + (0.375f64 * std::f64::consts::PI).sin());
-        let mean = Totals::of(&map).mean_radiance;
+        let mean = Totals::from_map(&map).mean_radiance;
         assert!(
             (f64::from(mean.x) - share).abs() < 1e-6
                 && (f64::from(mean.y) - (2.0 - share)).abs() < 1e-6

@@ -1,4 +1,4 @@
-//! Features that lights and options require of the path tracer's shaders; all others are specialized out.
+//! Features that lights and options require of paths' shaders; others are specialized out.
 
 use super::lights::Lights;
 use super::{PathOptions, Strategy, media};
@@ -6,7 +6,7 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::{LightKinds, PathFeature, PathFeatures};
 use crate::tracer::shading;
 
-/// Features that are required. `map`: the environment is a map; `cones`: textures are filtered by ray cones.
+/// The required features. `map`: the environment is a map; `cones`: ray cones filter textures.
 pub(super) fn features(
     options: &PathOptions,
     flat: &FlatScene,

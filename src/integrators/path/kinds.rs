@@ -1,4 +1,5 @@
-//! The integrators that are made of paths: global illumination, direct light, the ground truth of ambient occlusion, and views of surfaces.
+//! The integrators that are made of paths: global illumination, direct light, the ground truth of
+//! ambient occlusion, and views of surfaces.
 
 use super::ambient::{Ambient, EnvironmentLight};
 use super::report::{self, environment_text};
@@ -122,7 +123,7 @@ pub static BAKED_OCCLUSION: PathVariant = PathVariant {
     capabilities: &[Textures, CameraModel],
 };
 
-/// What an integrator computes.
+/// The quantity that an integrator computes.
 enum Kind {
     /// Light, up to so many bounces; `None`: as many as settings say.
     Light { max_depth: Option<u32> },
@@ -215,7 +216,7 @@ impl Integrator for PathVariant {
         6
     }
 
-    /// Only if the environment is black, and no lens or wide filter makes a pixel see beyond its area.
+    /// Only if the environment is black, and no lens or wide filter sees beyond a pixel's area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
         let black = !self.shows_environment(job.scene);
         let settings = &job.settings.path;
@@ -253,7 +254,7 @@ impl Integrator for PathVariant {
         Ok(Rendered { image: result.image, report, ..Default::default() })
     }
 
-    /// Tone mapped radiance; normals are mapped from -1..1 to 0..1, depths divided by their maximum.
+    /// Tone maps radiance, maps normals from -1..1 to 0..1, divides depths by their maximum.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image {
         let shown = |f: &dyn Fn(f32) -> f32| {
             let mut out = image.clone();

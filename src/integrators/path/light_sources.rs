@@ -1,4 +1,4 @@
-//! What light comes from: the environment in device memory, and the lights of a scene on the host.
+//! Sources of light: the environment in device memory, and the lights of a scene on the host.
 
 use std::sync::Arc;
 
@@ -46,8 +46,7 @@ impl LightSources {
         Ok(Self { environment, lights, builder })
     }
 
-    /// Features of shaders that the lights, options and scene require, and the kinds of lights that
-    /// light sampling must know. `cones`: textures are filtered by ray cones.
+    /// Features of shaders that lights, options and scene require, and the kinds of lights.
     pub fn features(&self, flat: &FlatScene, options: &PathOptions, cones: bool) -> (PathFeatures, LightKinds) {
         let has_map = self.environment.map.texels != 0;
         let (features, mut light_kinds) = features::features(options, flat, &self.lights, has_map, cones);
@@ -57,8 +56,7 @@ impl LightSources {
         (features, light_kinds)
     }
 
-    /// Returns true if paths must keep the density of light samples of the environment: no table
-    /// has it.
+    /// Returns true if paths must keep the environment's density, which no table has then.
     pub fn needs_sky_pdfs(&self, features: PathFeatures, light_kinds: LightKinds) -> bool {
         features.contains(PathFeature::LightSamples)
             && self.lights.environment.is_some()

@@ -1,7 +1,9 @@
-//! A light tree, which samples a light in proportion to a bound of its contribution at a point: [`LightNode`].
+//! A light tree, which samples a light in proportion to a bound of its contribution at a point:
+//! [`LightNode`].
 //!
-//! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, without the splitting; its cost of a split
-//! (surface area, orientation, power), with bounding spheres in place of boxes at the nodes.
+//! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG
+//! 2018, without the splitting; its cost of a split (surface area, orientation, power), with
+//! bounding spheres in place of boxes at the nodes.
 
 use std::f64::consts::PI;
 
@@ -9,7 +11,8 @@ use glam::DVec3;
 
 use crate::interface::records::lights::{LIGHT_BOTH_WAYS, LIGHT_LEAF, LightNode};
 
-/// Levels below which lights are split into halves without evaluating costs: with the levels of [`MAX_LIGHTS`] lights, no bit trail is longer than 64.
+/// Levels below which lights are split into halves without evaluating costs: with the levels of
+/// [`MAX_LIGHTS`] lights, no bit trail is longer than 64.
 const MEASURED_LEVELS: u32 = 32;
 /// Maximum number of lights in a tree: an index of a node has 30 bits.
 const MAX_LIGHTS: usize = 1 << 29;
@@ -100,7 +103,7 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     (axis.normalize(), spread)
 }
 
-/// Builds the nodes, root first, and each light's bit trail: bit k is set where the light is in the second child at level k.
+/// Builds the nodes, root first, and the lights' trails: bit k says second child at level k.
 pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u64>) {
     assert!(!lights.is_empty() && lights.len() <= MAX_LIGHTS, "{} lights", lights.len());
     let mut tree = Tree { lights, nodes: vec![LightNode::default()], trails: vec![0; lights.len()] };
@@ -121,18 +124,18 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// Fills node `at` with the lights `of`.
-    fn fill(&mut self, at: usize, of: &mut [u32], trail: u64, level: u32) -> Bounds {
-        if let [light] = *of {
+    /// Fills node `at` with lights.
+    fn fill(&mut self, at: usize, lights: &mut [u32], trail: u64, level: u32) -> Bounds {
+        if let [light] = *lights {
             self.trails[light as usize] = trail;
             let bounds = self.lights[light as usize];
             self.nodes[at] = bounds.node(LIGHT_LEAF | light);
             return bounds;
         }
-        let middle = self.split(of, level);
+        let middle = self.split(lights, level);
         let child = self.nodes.len();
         self.nodes.extend([LightNode::default(); 2]);
-        let (first, second) = of.split_at_mut(middle);
+        let (first, second) = lights.split_at_mut(middle);
         let a = self.fill(child, first, trail, level + 1);
         let b = self.fill(child + 1, second, trail | 1 << level, level + 1);
         let bounds = a.union(&b);
@@ -141,17 +144,19 @@ impl Tree<'_> {
     }
 
     /// Partitions lights into two non-empty sets; returns the size of the first.
-    fn split(&self, of: &mut [u32], level: u32) -> usize {
+    fn split(&self, lights: &mut [u32], level: u32) -> usize {
         let centroid = |k: u32| self.lights[k as usize].centroid();
-        let (lo, hi) =
-            of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(centroid(k)), hi.max(centroid(k))));
+        let grow = |(lo, hi): (DVec3, DVec3), &k: &u32| (lo.min(centroid(k)), hi.max(centroid(k)));
+        let (lo, hi) = lights.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), grow);
         let extent = hi - lo;
+
+        // The cheapest cut between bins along any axis.
         let mut best: Option<(f64, usize, f64)> = None;
         let axes = if level < MEASURED_LEVELS { 0..3 } else { 0..0 };
         for axis in axes.filter(|&a| extent[a] > 0.0) {
             let bin = |k: u32| (((centroid(k)[axis] - lo[axis]) / extent[axis] * BINS as f64) as usize).min(BINS - 1);
             let mut bins: [Option<Bounds>; BINS] = [None; BINS];
-            for &k in of.iter() {
+            for &k in lights.iter() {
                 let b = &self.lights[k as usize];
                 let slot = &mut bins[bin(k)];
                 *slot = Some(slot.map_or(*b, |s| s.union(b)));
@@ -171,11 +176,13 @@ impl Tree<'_> {
             }
         }
         if let Some((_, axis, cut)) = best {
-            let of_first = partition(of, |&k| centroid(k)[axis] < cut);
-            if of_first > 0 && of_first < of.len() {
-                return of_first;
+            let first = partition(lights, |&k| centroid(k)[axis] < cut);
+            if first > 0 && first < lights.len() {
+                return first;
             }
         }
+
+        // Else halves along the longest axis.
         let axis = if extent.x >= extent.y && extent.x >= extent.z {
             0
         } else if extent.y >= extent.z {
@@ -183,8 +190,8 @@ impl Tree<'_> {
         } else {
             2
         };
-        let half = of.len() / 2;
-        of.select_nth_unstable_by(half, |&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]).then(a.cmp(&b)));
+        let half = lights.len() / 2;
+        lights.select_nth_unstable_by(half, |&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]).then(a.cmp(&b)));
         half
     }
 }
@@ -242,8 +249,8 @@ mod tests {
         if left.0 > f64::from(n.cos_e) { f64::from(n.intensity) * left.0.max(1e-4) / d2 } else { 0.0 }
     }
 
-    /// Every bit trail leads to its light, and a parent's bounds contain its children's: if a light contributes at a point, all its
-    /// ancestors have an importance above 0 there.
+    /// Every trail leads to its light, and a parent's bounds contain its children's: if a light
+    /// contributes at a point, all its ancestors have an importance above 0 there.
     #[test]
     fn bounds_hold_what_is_below() {
         for n in [1, 2, 3, 100, 3000] {

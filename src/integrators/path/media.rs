@@ -1,4 +1,4 @@
-//! The volumes that a camera is in, and whether paths must track the volumes that they are in: shaders/path/media.glsl.
+//! The volumes that a camera is in, and whether paths must track theirs: shaders/path/media.glsl.
 
 use glam::{DAffine3, DVec3};
 
@@ -10,16 +10,16 @@ use crate::tracer::shading::{absorbs, is_medium};
 /// Maximum number of volumes that a path can be in at once.
 const MAX_NESTED: usize = 4;
 
-/// Directions of the rays that test whether a point is inside a volume, unlikely to be symmetry axes of a scene. The majority decides, in case one ray passes
-/// through an edge.
+/// Directions of the rays that test whether a point is inside a volume, unlikely to be symmetry
+/// axes of a scene. The majority decides, in case one ray passes through an edge.
 const DIRECTIONS: [DVec3; 3] = [
     DVec3::new(0.412_31, 0.827_17, 0.381_93),
     DVec3::new(-0.713_29, 0.211_07, 0.668_37),
     DVec3::new(0.137_83, -0.591_61, -0.794_33),
 ];
 
-/// Returns true if paths must track the volumes that they are in. A scene with one volume that does not absorb needs no tracking: the winding tells inside from
-/// outside.
+/// Returns true if paths must track the volumes that they are in. The winding tells inside from
+/// outside in a scene with one volume that does not absorb.
 pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
@@ -34,7 +34,7 @@ pub(super) struct ClosedVolumes(Vec<VolumeMesh>);
 /// A mesh that bounds a volume.
 struct VolumeMesh {
     material: u32,
-    /// World (relative to the scene's origin) to object space, in which the winding is the mesh's own.
+    /// World (relative to the scene's origin) to object space, where the winding is the mesh's own.
     to_object: DAffine3,
     /// A corner and two edges of each triangle.
     triangles: Vec<[DVec3; 3]>,
@@ -65,9 +65,9 @@ impl ClosedVolumes {
         Self(scene.instances.iter().filter_map(body).collect())
     }
 
-    /// The volumes that contain a point (relative to the scene's origin), innermost first: those whose surfaces a ray from there leaves more often than it
-    /// enters, in the order of leaving. [`INVALID`] at the end.
-    pub fn around(&self, point: DVec3) -> [u32; MAX_NESTED] {
+    /// The volumes that contain a point (relative to the scene's origin), innermost first, then
+    /// [`INVALID`]: those whose surfaces a ray from there leaves more often than it enters.
+    pub fn containing(&self, point: DVec3) -> [u32; MAX_NESTED] {
         let by_direction = DIRECTIONS.map(|d| self.along(point, d));
         // the majority; if all three differ, the first
         let most = by_direction.iter().find(|a| by_direction.iter().filter(|b| b == a).count() > 1).unwrap_or(&by_direction[0]);
@@ -100,7 +100,8 @@ impl ClosedVolumes {
     }
 }
 
-/// Intersects a ray with a triangle (a corner and two edges); returns the parameter, and whether the ray leaves through the back (Möller and Trumbore 1997).
+/// Intersects a ray with a triangle (a corner and two edges); returns the parameter, and whether
+/// the ray leaves through the back (Möller and Trumbore 1997).
 fn crossing(o: DVec3, d: DVec3, [a, e1, e2]: [DVec3; 3]) -> Option<(f64, bool)> {
     let p = d.cross(e2);
     let det = e1.dot(p);

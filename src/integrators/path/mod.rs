@@ -1,9 +1,11 @@
-//! Path tracing: the ground truth that ambient occlusion approximates. The streams `path_camera`, `path_bounce` and `path_shadow` and the pass
-//! `path_resolve`, several samples of each pixel at a time.
+//! Path tracing: the ground truth that ambient occlusion approximates. The streams `path_camera`,
+//! `path_bounce` and `path_shadow` and the pass `path_resolve`, several samples of a pixel at a
+//! time.
 //!
-//! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades their hits, which appends shadow rays to one
-//! queue and rays of the next bounce to another; `path_shadow` traces the first, `path_bounce` the second, until a queue is empty.
-//! Every path writes to its own memory only, so images do not depend on the order in which rays are processed.
+//! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades their hits,
+//! which appends shadow rays to one queue and rays of the next bounce to another; `path_shadow`
+//! traces the first, `path_bounce` the second, until a queue is empty. Every path writes to its own
+//! memory only, so images do not depend on the order in which rays are processed.
 
 pub mod ambient;
 mod ambient_light;
@@ -51,8 +53,8 @@ pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 const MIN_BOUNCES: u32 = 4;
 /// Maximum number of bounces per submission.
 const MAX_BOUNCES: u32 = 32;
-/// Launches that are made beyond those of the bounces, for surfaces that paths pass straight through: what is left then ends. A path counts such surfaces in 16 bits
-/// (`PathRecord::depth_passes`).
+/// Launches beyond those of the bounces, for surfaces that paths pass straight through. A path
+/// counts such surfaces in 16 bits (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
 /// Where the parameters of paths lie behind those of their block, bytes.
 const PARAMS_BYTES: u64 = size_of::<BlockParams>() as u64;
@@ -70,7 +72,7 @@ pub struct PathResult {
     pub ambient_rays: u64,
     /// Number of bounces of the longest path.
     pub longest_path: u32,
-    /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
+    /// Number of lights that are sampled, the environment and each portal included.
     pub lights: u32,
     /// A light tree chooses among them.
     pub light_tree: bool,
@@ -110,18 +112,18 @@ impl PathIntegrator {
     /// been built from `flat` with [`crate::tracer::Needs::shading`].
     ///
     /// # Errors
-    /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
+    /// Those of the device; [`Error::Usage`] for a tracer without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
         let capacity = max_rays(launch_rays(&tracer.device().info), options.samples.size, options.samples.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
-    /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
+    /// Number of lights that are sampled, the environment and each portal included.
     pub fn lights(&self) -> u32 {
         self.paths.light_count()
     }
 
-    /// Turns the environment map: `to_map` is the rotation from world directions to the map's. Other environments look the same from all sides.
+    /// Turns the environment map: `to_map` is the rotation from world directions to the map's.
     ///
     /// # Errors
     /// Those of the device.
@@ -129,17 +131,19 @@ impl PathIntegrator {
         self.paths.turn_environment(to_map)
     }
 
-    /// Moves lights, and surfaces that emit light, to where they are in `scene`, which is that of the tracer in another pose.
+    /// Moves lights, and emissive surfaces, to where they are in `scene`, which is that of the
+    /// tracer in another pose.
     ///
     /// # Errors
-    /// Those of the device; [`Error::Scene`] where lights were switched on or off, which needs other shaders.
+    /// Those of the device; [`Error::Scene`] where lights were switched, which needs other shaders.
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         self.paths.move_lights(tracer.device(), scene).map(drop)
     }
 
-    /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
+    /// Renders `spp` paths per pixel. `tracer` must be the one of [`PathIntegrator::new`].
     ///
-    /// # Errors Those of the device; [`Error::Usage`] for more paths than `options.samples.spp`;
+    /// # Errors
+    /// Those of the device; [`Error::Usage`] for more paths than `options.samples.spp`;
     /// [`crate::Error::Interrupted`] when `control` says so.
     pub fn render(
         &mut self,
@@ -197,7 +201,7 @@ struct TransmittedShadowRays {
 /// Streams and pipelines of all launches.
 struct PathPipelines {
     camera: Stream,
-    /// The same for camera rays that another pass has traced; `None` where each path has its own.
+    /// As `camera`, for hits of another pass; `None` where each path has a camera ray of its own.
     known: Option<Stream>,
     bounce: Stream,
     shadow: Stream,
@@ -209,8 +213,8 @@ struct PathEstimator {
     /// The launches that follow begin at known hits ([`BlockParams::known_hits`]).
     begins_at_known: bool,
     buffers: PathBuffers,
-    /// Parameters for filling either queue of bounces; then those for tracing either queue of shadow rays behind walls.
-    /// Each has the parameters of the block, and behind them those of paths.
+    /// Parameters for filling either queue of bounces; then those for tracing either queue of
+    /// shadow rays behind walls: those of the block, and behind them those of paths.
     block_params: Vec<Buffer>,
     records: Vec<PathParams>,
     walls: Option<TransmittedShadowRays>,
@@ -248,8 +252,7 @@ impl TransmittedShadowRays {
 }
 
 impl PathPipelines {
-    /// Compiles them. `has_known_hits`: paths may begin at camera rays that another pass has
-    /// traced.
+    /// Compiles them. `has_known_hits`: paths may begin at camera rays that another pass traced.
     fn new(tracer: &Tracer, constants: &Specialization, has_known_hits: bool) -> Result<Self> {
         let known = || tracer.with_known_hits(&shaders::PATH_CAMERA_CLOSEST, constants);
         Ok(Self {
@@ -292,12 +295,12 @@ fn upload_params(device: &Arc<Device>, records: &[PathParams]) -> Result<Vec<Buf
 }
 
 impl PathEstimator {
-    /// For launches of at most `most` paths. With `has_signal` the diffuse part of radiance is kept apart ([`signal`]).
+    /// For launches of up to `most` paths. `has_signal`: diffuse radiance is kept apart.
     fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, most: u32, has_signal: bool) -> Result<Self> {
         let device = tracer.device();
         let cones = check_tracer(tracer, options)?;
 
-        // lights, and what shaders must know of them
+        // Lights, and the features that shaders need for them.
         let sources = LightSources::new(device, flat, options)?;
         let (mut features, light_kinds) = sources.features(flat, options, cones);
         features.insert_if(has_signal, PathFeature::Signal);
@@ -306,7 +309,7 @@ impl PathEstimator {
         let lights = DeviceLights::new(device, lights)?;
         let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
 
-        // buffers
+        // Buffers.
         let base =
             PathParams { map: environment.map, environment: environment.factor.to_array(), ..lights.params(options.params()) };
         let (mut buffers, base) = PathBuffers::new(device, most, features, stores_sky_pdfs, base)?;
@@ -317,7 +320,7 @@ impl PathEstimator {
         let (records, of_first_surface) = buffers.launch_params(behind_walls, base);
         let block_params = upload_params(device, &records)?;
 
-        // pipelines
+        // Pipelines.
         let shares_camera_rays = !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens);
         let pipelines = PathPipelines::new(tracer, &constants, has_signal && shares_camera_rays)?;
 
@@ -343,12 +346,12 @@ impl PathEstimator {
         })
     }
 
-    /// Sets the volumes in which camera rays start: those around the middle of the near clipping plane, at the camera's position without one.
+    /// Sets the volumes in which camera rays start, by the middle of the near clipping plane.
     fn find_camera_media(&mut self, camera: &CameraRecord) -> Result<()> {
         let Some(volumes) = &self.volumes else { return Ok(()) };
         let near = camera.clip[0];
         let start = camera.camera_to_world.map(|row| f64::from(row[3] - near * row[2]));
-        let camera_media = volumes.around(glam::DVec3::from_array(start));
+        let camera_media = volumes.containing(glam::DVec3::from_array(start));
         self.change_records(|record| record.camera_media = camera_media)
     }
 
@@ -380,10 +383,10 @@ impl PathEstimator {
         if self.features.contains(PathFeature::LightSamples) { self.lights.count() } else { 0 }
     }
 
-    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    /// Moves the lights to where they are in `scene`; returns true if they have moved.
     ///
     /// # Errors
-    /// Those of the device; [`Error::Scene`] if the lights are so different that they need other shaders.
+    /// Those of the device; [`Error::Scene`] for lights that need other shaders.
     fn move_lights(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<bool> {
         let Some(builder) = &mut self.light_builder else { return Ok(false) };
         let lights = builder.lights(scene);
@@ -391,11 +394,9 @@ impl PathEstimator {
             return Ok(false);
         }
         self.lights.check_fits(&lights, self.features, self.light_kinds)?;
-        self.lights = DeviceLights::new(device, lights)?;
-        for (record, buffer) in self.records.iter_mut().zip(&mut self.block_params) {
-            *record = self.lights.params(*record);
-            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
-        }
+        let lights = DeviceLights::new(device, lights)?;
+        self.change_records(|record| *record = lights.params(*record))?;
+        self.lights = lights;
         Ok(true)
     }
 
@@ -428,7 +429,7 @@ impl PathEstimator {
         r.copy(self.buffers.shadow_queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 1), 4);
     }
 
-    /// Records the rays of first surfaces that a vertex generated; their number is read back from `slot`.
+    /// Records the rays of first surfaces of a vertex; their number is read back from `slot`.
     fn record_first_surface(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         for FirstSurfaceRays { queue, params, count } in &self.of_first_surface {
             r.barrier();
@@ -440,7 +441,7 @@ impl PathEstimator {
     }
 
     /// Empties the queues of the rays that a vertex leaves for lights.
-    fn clear_light_queues(&self, r: &mut crate::gpu::Recorder) {
+    fn clear_light_queues(&self, r: &mut Recorder) {
         self.buffers.shadow_queue.clear(r);
         self.of_first_surface.iter().for_each(|rays| rays.queue.clear(r));
     }
@@ -471,7 +472,7 @@ impl PathEstimator {
     }
 
     /// Traces all bounces of a launch, and adds the paths to the film.
-    fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
+    fn trace_to_film(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let resolved = Push { pass: self.block_params[0].address(), ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
         self.trace(commands, push, |paths, r| {
@@ -479,7 +480,8 @@ impl PathEstimator {
         })
     }
 
-    /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with thin walls that transmit, one. Then records `finish`, which reads the paths.
+    /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with
+    /// thin walls that transmit, one. Then records `finish`, which reads the paths.
     fn trace(&mut self, commands: &mut Commands, push: Push, finish: impl Fn(&Self, &mut Recorder)) -> Result<Vec<Timing>> {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
@@ -488,7 +490,8 @@ impl PathEstimator {
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         let mut longest = 0;
-        // vertex `depth` fills queue `depth % 2`
+
+        // Submissions of several bounces each; vertex `depth` fills queue `depth % 2`.
         loop {
             // rays behind walls are traced before the next vertices append others
             let before = self.bounces_before.saturating_sub(depth);
@@ -505,12 +508,8 @@ impl PathEstimator {
                     self.buffers.queues[0].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    self.pipelines
-                        .known
-                        .as_ref()
-                        .filter(|_| self.begins_at_known)
-                        .unwrap_or(&self.pipelines.camera)
-                        .record(r, &push(0));
+                    let known = self.pipelines.known.as_ref().filter(|_| self.begins_at_known);
+                    known.unwrap_or(&self.pipelines.camera).record(r, &push(0));
                     self.record_shadow(r, push(0), left, MAX_BOUNCES);
                     self.record_first_surface(r, push(0), left, MAX_BOUNCES);
                 }
@@ -525,26 +524,24 @@ impl PathEstimator {
                     self.pipelines.bounce.record(r, &self.buffers.queues[traced].push(push(fills), left));
                     r.copy(self.buffers.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * slot), 4);
                     self.record_shadow(r, push(fills), left, slot);
-                    // what lies behind surfaces that paths pass straight through is a first surface, too
+                    // surfaces behind those that paths pass straight through are first ones, too
                     if straight {
                         self.record_first_surface(r, push(fills), left, slot);
                     }
                 }
+
+                // Number of rays that are left for the next submission.
                 r.barrier();
-                // number of rays that are left for the next submission
-                r.copy(
-                    self.buffers.queues[depth as usize % 2].count(),
-                    0,
-                    &self.counts,
-                    4 * u64::from(COUNTS * MAX_BOUNCES),
-                    4,
-                );
+                let left = self.buffers.queues[depth as usize % 2].count();
+                r.copy(left, 0, &self.counts, 4 * u64::from(COUNTS * MAX_BOUNCES), 4);
                 if finishes {
                     finish(self, r);
                 }
             })?);
             started = true;
             timings.extend(self.trace_behind_walls(commands, push(0))?);
+
+            // Count the rays, and finish when none is left.
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
                 let rays = counts[(COUNTS * (k - begin)) as usize];
@@ -553,7 +550,7 @@ impl PathEstimator {
                 }
                 self.traced.bounce_rays += u64::from(rays);
             }
-            let sum = |of: usize| counts.iter().skip(of).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
+            let sum = |first: usize| counts.iter().skip(first).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
             self.traced.shadow_rays += sum(1) + sum(DISTANT_COUNT as usize);
             self.traced.ambient_rays += sum(AMBIENT_COUNT as usize);
             left = counts[(COUNTS * MAX_BOUNCES) as usize];
@@ -569,8 +566,10 @@ impl PathEstimator {
     }
 }
 
-/// Number of bounces in the next submission of a launch of `all` paths of which `left` are left, where the launch before took `before` more bounces. A launch is as large as the paths that were left when it was
-/// recorded, and a submission costs some tenths of a millisecond on a GPU: the fewer are left, the more bounces. A few paths of millions go on for tens of bounces.
+/// Number of bounces in the next submission of a launch of `all` paths of which `left` are left,
+/// where the launch before took `before` more bounces. A launch is as large as the paths left at
+/// its recording, and a submission costs some tenths of a millisecond on a GPU: the fewer are left,
+/// the more bounces. A few paths of millions go on for tens of bounces.
 fn bounces_of_submission(all: u32, left: u32, before: u32) -> u32 {
     let fit = u64::from(MIN_BOUNCES) * u64::from(all) / u64::from(left.max(1));
     fit.min(before.into()).clamp(MIN_BOUNCES.into(), MAX_BOUNCES.into()) as u32
@@ -587,7 +586,7 @@ impl Estimator for PathEstimator {
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], _: bool) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         for push in launches {
-            timings.extend(self.launch_one(commands, *push)?);
+            timings.extend(self.trace_to_film(commands, *push)?);
         }
         Ok(timings)
     }
@@ -603,7 +602,7 @@ mod tests {
         // of the first launch nothing is known
         assert_eq!(bounces_of_submission(all, all, 0), MIN_BOUNCES);
         assert_eq!(bounces_of_submission(all, 100, 0), MIN_BOUNCES);
-        // as many groups of threads as the first submission has, and no more bounces than there were before
+        // as many groups of threads as at first, and no more bounces than there were before
         assert_eq!(bounces_of_submission(all, all / 3, 23), 12);
         assert_eq!(bounces_of_submission(all, all / 50, 11), 11);
         assert_eq!(bounces_of_submission(all, 0, 1000), MAX_BOUNCES);

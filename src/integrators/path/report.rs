@@ -34,9 +34,10 @@ pub(super) fn report(
     o: &PathOptions,
     result: &PathResult,
 ) -> IntegratorReport {
+    // Lines for people.
     let (image, stats) = (&result.image, tracer.stats());
-    let (paths, rays) =
-        (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays + result.ambient_rays);
+    let paths = image.primary_rays;
+    let rays = paths + result.bounce_rays + result.shadow_rays + result.ambient_rays;
     let per_second = |n: u64| {
         let millions = n as f64 / image.trace_seconds.max(1e-9) / 1e6;
         // of small images on a busy machine, too
@@ -56,6 +57,8 @@ pub(super) fn report(
         if o.max_depth >= MAX_DEPTH { "no limit".to_owned() } else { format!("limit {}", o.max_depth) },
     )];
     lines.extend(o.remarks());
+
+    // Explanations of what was compiled.
     let shading = tracer.features().shading.unwrap_or_default();
     let mut explanations = vec![
         compiled("materials require", joined(shading.bsdfs.labels(), shading.materials.labels())),
@@ -67,6 +70,8 @@ pub(super) fn report(
         0 => "no light sampling: there are no lights, or --sampling does not use it".into(),
         n => format!("{n} lights, sampled by {}", chosen_by(result)),
     });
+
+    // The record for programs.
     let record = json!({
         "environment": environment_text(job.scene, o),
         "mip_levels": stats.mip_levels,

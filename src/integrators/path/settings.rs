@@ -19,22 +19,21 @@ use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
 use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
-const LIGHT: AppliesTo = AppliesTo::of(Capability::LightTransport);
+const LIGHT: AppliesTo = AppliesTo::all_of(Capability::LightTransport);
 /// Integrators whose path length is configurable.
-const LONG: AppliesTo = AppliesTo::of(Capability::PathLength);
+const LONG: AppliesTo = AppliesTo::all_of(Capability::PathLength);
 /// Integrators that use a pixel filter and a lens.
 const CAMERA: AppliesTo = AppliesTo::stills_of(Capability::CameraModel);
 /// Integrators that read textures.
-const TEXTURES: AppliesTo = AppliesTo::of(Capability::Textures);
+const TEXTURES: AppliesTo = AppliesTo::all_of(Capability::Textures);
 /// Integrators with a choice of sampling strategy.
-const SAMPLED: AppliesTo = AppliesTo::of(Capability::SamplingStrategy);
+const SAMPLED: AppliesTo = AppliesTo::all_of(Capability::SamplingStrategy);
 /// The integrator with a white sky.
-const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
+const SKY: AppliesTo = AppliesTo::all_of(Capability::WhiteSky);
 /// The integrator with ambient light.
-const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
+const AMBIENT: AppliesTo = AppliesTo::all_of(Capability::AmbientLight);
 
-/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl)
-/// ends paths long before.
+/// Maximum path length, in bounces; Russian roulette ends paths long before.
 pub const MAX_DEPTH: u32 = 4096;
 
 /// Default albedo of `ao-sky`.
@@ -132,13 +131,11 @@ pub struct PathOptions {
     /// Settings of samples, of one path each. A tile mask needs a black environment,
     /// and neither a lens nor a wide pixel filter.
     pub samples: SampleSettings,
-    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most
-    /// [`MAX_DEPTH`].
+    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light.
     pub max_depth: u32,
     /// Sampling strategy.
     pub strategy: Strategy,
-    /// Continue paths by delta lobes only, so that light sampling accounts for all other light:
-    /// with [`Strategy::Light`].
+    /// Continue paths by delta lobes only, as all other light is sampled: with [`Strategy::Light`].
     pub specular_only: bool,
     /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the
     /// rendering equation that ambient occlusion approximates.
@@ -205,7 +202,7 @@ impl PathOptions {
     /// The options that the samples of an image depend on, each with its key, its text in an
     /// image's metadata (`None`: the key is absent), and its value in the JSON record.
     fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
-        // without `..`, so that a new option must be added here
+        // Without `..`, so that a new option must be added here.
         let Self {
             samples:
                 SampleSettings { size: _, spp: _, seed: _, pixel_filter, time_limit: _, keep_rays: _, tile_mask: _, film: _ },
@@ -223,6 +220,8 @@ impl PathOptions {
             texture_filter,
             lens,
         } = self;
+
+        // Texts of metadata are short, and absent where the default holds.
         let default = Self::default();
         let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
         let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
@@ -336,8 +335,7 @@ impl PathOptions {
         self
     }
 
-    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key
-    /// is absent.
+    /// Metadata by which a film is known to be of the same render. `None`: the key is absent.
     pub fn identity(&self) -> Vec<(&'static str, Option<String>)> {
         self.described().into_iter().map(|(key, text, _)| (key, text)).collect()
     }
@@ -412,8 +410,7 @@ mod tests {
     use super::*;
     use crate::interface::path_options;
 
-    /// Every option that is a number in shaders is a setting, an option, and described; and shaders
-    /// get its value.
+    /// Every number of shaders is a setting, an option, and described; and shaders get its value.
     #[test]
     fn numbers_stand_in_every_table() {
         let fields = path_options::FILE.records[0].fields.iter();
@@ -440,8 +437,7 @@ mod tests {
         }
     }
 
-    /// An option that needs code of its own in shaders has it, and one that makes images biased is
-    /// remarked on.
+    /// Options that need code of their own have it, and biased ones are remarked on.
     #[test]
     fn numbers_have_their_features_and_remarks() {
         let enabled = |options: &PathOptions| -> Vec<PathFeature> {

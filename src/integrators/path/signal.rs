@@ -1,11 +1,11 @@
-//! Paths for frames in real time: their diffuse reflection is kept apart from the rest, so that both can be filtered, and what they are reprojected and filtered by
-//! is found by rays of its own ([`SignalPaths::surfaces`]).
+//! Paths for frames in real time: diffuse reflection is kept apart from the rest, so that both can
+//! be filtered, and guide rays find surfaces to reproject by ([`SignalPaths::surfaces`]).
 
 use glam::DMat3;
 
 use super::{PathEstimator, PathOptions};
 use crate::accel::flatten::FlatScene;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
@@ -24,7 +24,7 @@ pub struct SignalPaths {
     /// Parameters of ambient light; all other fields are 0.
     ambient: BlockParams,
     rr_depth: u32,
-    /// Of the frame.
+    /// Parameters of the frame's block.
     block: BlockParams,
 }
 
@@ -44,7 +44,8 @@ struct RaysBehind {
 }
 
 impl SignalPaths {
-    /// Creates it for launches of at most `capacity` paths. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
+    /// Creates it for launches of at most `capacity` paths. The tracer must have been built from
+    /// `flat` with [`crate::tracer::Needs::shading`].
     ///
     /// # Errors
     /// Those of [`super::PathIntegrator::new`].
@@ -73,25 +74,17 @@ impl SignalPaths {
         let PathEstimator { features, light_kinds, .. } = &self.paths;
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
         let params = |name, bytes: usize| Buffer::new(device, name, bytes as u64, Memory::Upload);
-        let two = |name, bytes| Ok::<_, crate::Error>([params(name, bytes)?, params(name, bytes)?]);
-        let behind = match scene.materials.iter().any(may_be_smooth) {
-            false => None,
-            true => {
-                let states = || {
-                    Buffer::new(
-                        device,
-                        "rays of the G-buffer",
-                        size_of::<GuideRayRecord>() as u64 * u64::from(pixels),
-                        Memory::Device,
-                    )
-                };
-                Some(RaysBehind {
-                    stream: tracer.specialized(&shaders::PATH_REFLECTION_CLOSEST, &constants)?,
-                    queues: [RayQueue::new(device, pixels)?, RayQueue::new(device, pixels)?],
-                    states: [states()?, states()?],
-                })
-            }
+        let two = |name, bytes| Ok::<_, Error>([params(name, bytes)?, params(name, bytes)?]);
+        let behind = || {
+            let bytes = size_of::<GuideRayRecord>() as u64 * u64::from(pixels);
+            let states = || Buffer::new(device, "rays of the G-buffer", bytes, Memory::Device);
+            Ok::<_, Error>(RaysBehind {
+                stream: tracer.specialized(&shaders::PATH_REFLECTION_CLOSEST, &constants)?,
+                queues: [RayQueue::new(device, pixels)?, RayQueue::new(device, pixels)?],
+                states: [states()?, states()?],
+            })
         };
+        let behind = scene.materials.iter().any(may_be_smooth).then(behind).transpose()?;
         Ok(GuideRays {
             camera: tracer.specialized(&shaders::PATH_SURFACE_CLOSEST, &constants)?,
             behind,
@@ -113,21 +106,24 @@ impl SignalPaths {
         self.paths.turn_environment(to_map)
     }
 
-    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose;
+    /// returns true if they have moved.
     ///
     /// # Errors
-    /// Those of the device; [`crate::Error::Scene`] if the lights are so different that they need other shaders.
+    /// Those of the device; [`crate::Error::Scene`] for lights that need other shaders.
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<bool> {
         self.paths.move_lights(tracer.device(), scene)
     }
 
-    /// Returns true if paths can begin at [`BlockParams::known_hits`]. They cannot where each has a camera ray of its own: through a lens, or through surfaces of stochastic alpha.
+    /// Returns true if paths can begin at [`BlockParams::known_hits`], as they share camera rays.
     pub fn can_begin_at_known(&self) -> bool {
         self.paths.pipelines.known.is_some()
     }
 
-    /// Begins a frame: the camera and its block, with [`BlockParams::frame`], [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE` for samples that all lie
-    /// there. Russian roulette begins after `rr_depth` bounces, if the options do not say later.
+    /// Begins a frame: the camera and its block, with [`BlockParams::frame`],
+    /// [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE`
+    /// for samples that all lie there. Russian roulette begins after `rr_depth` bounces, or later
+    /// by the options.
     ///
     /// # Errors
     /// Those of the device.
@@ -141,7 +137,8 @@ impl SignalPaths {
         self.paths.write_block(&self.block)
     }
 
-    /// The launches that follow have `1 << bits` pixels of each listed one ([`BlockParams::listed`]) beyond [`BlockParams::cells`].
+    /// Has later launches take `1 << bits` more pixels of each listed one
+    /// ([`BlockParams::listed`]).
     ///
     /// # Errors
     /// Those of the device.
@@ -150,7 +147,8 @@ impl SignalPaths {
         self.paths.write_block(&self.block)
     }
 
-    /// Traces the paths of a launch; then `path_gather` adds them to the images of the frame, with each of `gathers`: the paths that it gathers, and its parameters.
+    /// Traces the paths of a launch; then `path_gather` adds them to the images of the frame, with
+    /// each of `gathers`: the paths that it gathers, and its parameters.
     ///
     /// # Errors
     /// Those of the device.
@@ -176,8 +174,9 @@ impl SignalPaths {
 }
 
 impl GuideRays {
-    /// Writes the parameters of a frame. `params`: those of the block, with [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`]. `outputs`: what is written for each
-    /// pixel; its other fields are 0.
+    /// Writes the parameters of a frame. `params` are those of the block, with
+    /// [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`]; `outputs`
+    /// are written for each pixel, and its other fields are 0.
     ///
     /// # Errors
     /// Those of the device.
@@ -221,7 +220,7 @@ impl GuideRays {
     }
 }
 
-/// Returns true if a surface of the material may consist of delta lobes alone, so that it shows others.
+/// Returns true if a surface of the material may have delta lobes alone, and so show others.
 fn may_be_smooth(material: &Material) -> bool {
     match material.kind {
         MaterialKind::Mirror | MaterialKind::Glass => true,

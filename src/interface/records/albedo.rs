@@ -12,9 +12,10 @@ records! {
         ALBEDO_SHEEN: uint = 2;
         /// Layer: albedo of perfectly reflecting Beckmann microfacets, by the stretched cosine.
         ALBEDO_BECKMANN: uint = 3;
-        /// First of eight layers for each index of refraction: `DIELECTRIC_*` as seen from outside, then from inside.
+        /// First of eight layers per index of refraction: `DIELECTRIC_*` from outside, then inside.
         ALBEDO_DIELECTRIC: uint = 4;
-        /// GGX microfacets with the exact Fresnel term F of a dielectric: light reflected beyond the critical angle, over `ALBEDO_GGX`.
+        /// GGX microfacets with a dielectric's exact Fresnel term: light reflected beyond the
+        /// critical angle, over `ALBEDO_GGX`.
         DIELECTRIC_TOTAL: uint = 0;
         /// Light reflected below the critical angle, over `ALBEDO_GGX`.
         DIELECTRIC_REFLECTED: uint = 1;

@@ -3,7 +3,7 @@
 records! {
     "aov";
 
-    /// What the ray through a pixel's centre hits.
+    /// Surface properties at the hit of the ray through a pixel's centre.
     AovPixel: Words {
         /// Distance along the ray, scene units; infinite for a miss.
         depth: float,

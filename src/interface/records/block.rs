@@ -6,11 +6,12 @@ records! {
     "block" includes "queue" values {
         /// Pixels along a side of the tiles in which the pixels of a block are numbered.
         TILE: uint = 8;
-        /// Log2 of the pixels of a bundle, whose camera rays share a list of entry points: 2x2, which follow one another in the order of pixels.
+        /// Log2 of the pixels of a bundle, 2x2 in a row, whose rays share a list of entry points.
         BUNDLE_BITS: uint = 2;
         /// Maximum number of entry points of a bundle.
         MAX_ENTRY_POINTS: uint = 12;
-        /// Bytes of a bundle's list: a pair of words per entry point, the block and the least distance to it, near to far, and a pair of `INVALID` at the end.
+        /// Bytes of a bundle's list: per entry point its block and the least distance to it, near
+        /// to far, then a pair of `INVALID`.
         ENTRY_LIST_BYTES: uint = 128;
     };
 
@@ -18,7 +19,7 @@ records! {
     BlockParams: Block(access: "readonly", align: 16) {
         /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
-        /// Half width and half height of the view: tangents for a perspective camera, scene units for an orthographic one.
+        /// Half width and half height of the view: tangents, or scene units if orthographic.
         view: vec2,
         /// 1: the camera is orthographic.
         orthographic: uint,
@@ -58,17 +59,19 @@ records! {
         path: address,
         /// One of `FILTER_*`: the reconstruction filter.
         pixel_filter: uint,
-        /// Frames in real time: number of pixels that are sampled in a frame. Rays of pixels beyond are of listed ones, `1 << listed_bits` after another of each.
+        /// Frames in real time: number of pixels that are sampled in a frame. Rays of pixels beyond
+        /// are of listed ones, `1 << listed_bits` after another of each.
         cells: uint,
         /// Address of the `SurfacesParams`, or 0.
         surfaces: address,
-        /// The entry points of each bundle of pixels of a launch (entry_points.glsl), or 0: camera rays start at the root.
+        /// Entry points of each bundle of pixels (entry_points.glsl); 0: rays start at the root.
         entry_points: address,
         /// Offset of rays through the centres of pixels from there, pixels.
         centre_offset: vec2,
-        /// Frames in real time: the listed pixels among those that are sampled, a `uint` each (`SurfacesParams.list`).
+        /// Frames in real time: listed ones among the sampled pixels (`SurfacesParams.list`).
         listed: address,
-        /// Frames in real time: what the ray through each pixel of the image hits, a `KnownHit` each (`path_surface`), or 0: paths trace their camera rays themselves.
+        /// Frames in real time: a `KnownHit` per pixel of the image (`path_surface`), or 0: paths
+        /// trace their camera rays themselves.
         known_hits: address,
         /// Log2 of the number of pixels beyond `cells` that are of a listed one.
         listed_bits: uint,

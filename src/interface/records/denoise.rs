@@ -1,4 +1,4 @@
-//! Estimates of radiance: input and output of the denoiser's filter, and the signals of frames in real time.
+//! Estimates of radiance: input and output of the denoiser's filter, and the signals of frames.
 
 records! {
     "denoise" values {
@@ -6,7 +6,7 @@ records! {
         NLMEANS_RADIUS: uint = 4;
         /// Side of the square of pixels that a thread of `nlmeans` filters.
         NLMEANS_BLOCK: uint = 4;
-        /// The same of `nlmeans_radiance`.
+        /// Side of the square of pixels that a thread of `nlmeans_radiance` filters.
         NLMEANS_RADIANCE_BLOCK: uint = 2;
     };
 
@@ -18,7 +18,8 @@ records! {
         samples: float,
         /// Variance of one sample, by channel.
         variance: vec3,
-        /// By how much the filter's box is narrowed here: 0 not at all, 1 to the pixel itself; negative where light has changed from one frame to the next.
+        /// Narrowing of the filter's box: 0 not at all, 1 to the pixel itself; negative where light
+        /// has changed from one frame to the next.
         narrowed: float,
     }
 
@@ -30,9 +31,10 @@ records! {
         from: address,
         /// Output, a float per pixel; of radiance a `vec4`.
         to: address,
-        /// A float per pixel: depth of its surface, scene units; negative where it shows several, 0 where it is left alone. Pixels of different surfaces are not averaged. 0: all may be.
+        /// A float per pixel: depth of its surface, scene units, negative for several surfaces, 0
+        /// if left alone; or 0. Pixels of different surfaces are not averaged.
         depths: address,
-        /// How much pixels may differ, as a factor of the variance of their difference, for their weight to fall to 1/e.
+        /// Difference of pixels, over the variance of it, at which their weight falls to 1/e.
         sameness: float,
         /// Padding to a multiple of 8 bytes.
         reserved: float,

@@ -1,4 +1,4 @@
-//! Pixels of the film on the device: compensated sums (Kahan 1965), each a sum and its compensation term.
+//! Pixels of the film on the device: compensated sums (Kahan 1965), each a sum and its excess.
 
 records! {
     "film";

@@ -13,12 +13,13 @@
 
 records! {
     "frame" values {
-        /// Largest variance that a packed estimate holds, of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two.
+        /// Largest variance that a packed estimate holds, of values from 0 to 1: twice a quarter,
+        /// for unbiased estimates from two values.
         MAX_VARIANCE: float = 0.5;
     };
 
-    /// Parameters that all passes of a frame share: the cameras of this frame and of the previous one, the sampling settings, and the G-buffer. Parameters of a
-    /// single pass are in src/interface/records/passes.rs.
+    /// Parameters that all passes of a frame share: the cameras of this frame and of the previous
+    /// one, the sampling settings, and the G-buffer. `passes.rs` has those of a single pass.
     FrameParams: Block(access: "readonly", align: 16) {
         /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
@@ -26,7 +27,7 @@ records! {
         world_to_camera: vec4[3],
         /// World to camera of the previous frame, three rows.
         previous_world_to_camera: vec4[3],
-        /// Half width and half height of the view: tangents for a perspective camera, scene units for an orthographic one.
+        /// Half width and half height of the view: tangents, or scene units if orthographic.
         view: vec2,
         /// `view` of the previous frame.
         previous_view: vec2,
@@ -36,7 +37,7 @@ records! {
         previous_orthographic: uint,
         /// Image size, pixels.
         size: uvec2,
-        /// Where a pixel's sample lies in this frame: offset from the pixel's centre, pixels, each coordinate at least -0.5 and below 0.5.
+        /// Offset of this frame's samples from their pixels' centres, pixels, in [-0.5, 0.5).
         offset: vec2,
         /// `offset` of the previous frame.
         previous_offset: vec2,
@@ -58,7 +59,7 @@ records! {
         falloff_log2: float,
         /// Maximum history length, in samples.
         most_samples: float,
-        /// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as another surface.
+        /// Distance from a tangent plane, in footprints, at which neighbours are other surfaces.
         depth_tolerance: float,
         /// Cosine between normals below which a neighbour counts as another surface.
         normal_tolerance: float,
@@ -84,11 +85,12 @@ records! {
         previous_position: address,
     }
 
-    /// An object that moved or deformed: a box around its bounds in the previous frame and in this one.
+    /// An object that moved or deformed: a box around its bounds in the previous and in this frame.
     MovedRecord: Array(buffer: "MovedRecords", access: "readonly", align: 16) {
         /// Lower corner, world space relative to the scene's origin.
         lower: vec3,
-        /// Fraction of the hemisphere part that the box covers which may have changed in this frame: distance moved over size, at most 1.
+        /// Fraction of the hemisphere part that the box covers which may have changed: distance
+        /// moved over size, at most 1.
         share: float,
         /// Upper corner.
         upper: vec3,
@@ -100,7 +102,7 @@ records! {
     SurfaceRecord: Words {
         /// Position, world space relative to the scene's origin.
         position: vec3,
-        /// Distance along the normal at which a ray must start to avoid self-intersection, scene units.
+        /// Distance along the normal at which rays start, against self-intersection, scene units.
         spawn_offset: float,
     }
 }

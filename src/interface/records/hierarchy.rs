@@ -1,5 +1,6 @@
-//! The compute tracer's acceleration structures: blocks of the wide BVH, each a node or a leaf of one of three kinds; nodes and primitives of the binary BVH;
-//! and the hits of a launch. Records are loaded as pairs of words. A primitive's group is its BLAS.
+//! The compute tracer's acceleration structures: blocks of the wide BVH, each a node or a leaf of
+//! one of three kinds; nodes and primitives of the binary BVH; and the hits of a launch. Records
+//! are loaded as pairs of words. A primitive's group is its BLAS.
 
 records! {
     "hierarchy" values {
@@ -13,18 +14,19 @@ records! {
         LEAF: uint = 0x8000_0000;
         /// Binary BVH: first bit of the split axis in a reference to an inner node.
         AXIS_SHIFT: uint = 27;
-        /// Binary BVH: mask of the node index in a reference to an inner node, or of the first primitive in one to a leaf.
+        /// Binary BVH: mask of an inner node's index or a leaf's first primitive in a reference.
         NODE_NUMBER: uint = 0x07ff_ffff;
         /// The null reference: traversal pops the next one from its stack.
         NEXT: uint = 0x7fff_fffd;
         /// Entries of the wide kernels' traversal stack that are kept in registers.
         STACK_IN_REGISTERS: uint = 6;
-        /// Initial value of `LaunchHit.t`. Some CPU drivers leave any loop after 65,535 iterations: a ray to which this happens keeps this value, and is reported
-        /// instead of returning the result of an earlier launch.
+        /// Initial value of `LaunchHit.t`. Some CPU drivers leave any loop after 65,535 iterations:
+        /// a ray keeps this value then, and is reported instead of returning an earlier result.
         UNFINISHED: uint = 0x7fc0_dead;
-        /// Maximum number of rays of a launch that are suspended where drivers end loops early (trace/suspend.glsl).
+        /// Maximum number of suspended rays of a launch (trace/suspend.glsl).
         SUSPENDED_RAYS: uint = 0x4000;
-        /// First word of the first suspended ray. Before it are their number, and the numbers of work-groups along x, y and z that resume them.
+        /// First word of the first suspended ray, after their number and the numbers of work-groups
+        /// along x, y and z that resume them.
         SUSPENDED_START: uint = 4;
         /// Words of a suspended ray before its traversal stack.
         SUSPENDED_WORDS: uint = 20;
@@ -40,13 +42,14 @@ records! {
         flags: uint,
     }
 
-    /// A node of the wide BVH: boxes of up to seven children, quantized to 8 bits per plane. The eighth byte of each `bytes8` holds other data.
+    /// A node of the wide BVH: boxes of up to seven children, quantized to 8 bits per plane. The
+    /// eighth byte of each `bytes8` holds other data.
     WideNode: Words {
         /// Lower corner of the node.
         corner: vec3,
         /// Index of the first child's block; the others follow in slot order.
         first_child: uint,
-        /// Lower planes along x of children 0 to 6; then the exponent of the scale along x, biased as a float's.
+        /// Lower planes along x of children 0 to 6; then the scale's biased exponent along x.
         lower_x: bytes8,
         /// Upper planes along x; then 0.
         upper_x: bytes8,
@@ -66,7 +69,7 @@ records! {
         corners: vec3[4],
         /// Indices of the triangles in the BLAS, with flags; all ones: there is no second triangle.
         primitives: uvec2,
-        /// Four bits per triangle: the positions of its second and third vertex in (0, 1, 2) or (0, 2, 3), two bits each.
+        /// Four bits per triangle: its second and third vertex in (0, 1, 2) or (0, 2, 3).
         order: uint,
         /// `LEAF`.
         flags: uint,
@@ -106,8 +109,9 @@ records! {
     BinaryNode: Words {
         /// Lower and upper corner of both children.
         boxes: vec3[2][2],
-        /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node with the axis of its own children in
-        /// bits 27-28 and its number in bits 0-26. Along that axis child 0 is the lower one. A leaf of the top level holds an `InstanceRecord`.
+        /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26;
+        /// otherwise an inner node with its number in bits 0-26 and the axis of its children in
+        /// bits 27-28, along which child 0 is lower. A TLAS leaf is an `InstanceRecord`.
         children: uvec2,
         /// Padding to 64 bytes, one cache line.
         reserved: uvec2,

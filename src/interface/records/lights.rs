@@ -8,7 +8,8 @@ records! {
         LIGHT_MIRRORED: uint = 2;
         /// Flag of a triangle: its material has alpha, which scales what it emits.
         LIGHT_ALPHA: uint = 4;
-        /// First of five bits in the flags of a triangle that is part of one with a picture: number of parts along an edge; 0: it is whole.
+        /// First of five bits in the flags of a triangle in parts, one with a picture: number of
+        /// parts along an edge; 0: it is whole.
         LIGHT_SIDE_AT: uint = 8;
         /// First of five bits: cells before the part along the first edge.
         LIGHT_ROW_AT: uint = 13;
@@ -28,25 +29,26 @@ records! {
 
     /// A light of the scene.
     LightRecord: Array(buffer: "LightRecords", access: "readonly", align: 16) {
-        /// Lights from a position: that; triangle, rectangle, portal: a corner; sphere: centre. World space.
+        /// World-space position; corner of triangle, rectangle, portal; centre of a sphere.
         position: vec3,
         /// Sphere: radius; directional: 1 - cosine of half its angular diameter.
         radius: float,
-        /// Lights from a position, directional: direction of emission; triangle, rectangle, portal: first edge.
+        /// Direction of emission of lights from a position or directional; else the first edge.
         axis: vec3,
-        /// First number that src/scene/lights/NAME.rs gives to the light's shader; spot: cosine of the inner cone angle.
+        /// First number of src/scene/lights/NAME.rs; spot: cosine of the inner cone angle.
         parameter_0: float,
         /// Triangle, rectangle, portal: second edge.
         edge: vec3,
         /// Second one; spot: cosine of the outer cone angle.
         parameter_1: float,
-        /// Lights from a position: radiant intensity; directional: irradiance; other kinds: radiance, before any texture. Linear RGB.
+        /// Radiant intensity of lights from a position, irradiance of directional ones; else
+        /// radiance, before any texture. Linear RGB.
         intensity: vec3,
         /// Lights from a position: range beyond which the light has no effect, scene units.
         range: float,
-        /// Distant lights: probability of being chosen among them; placed ones: in a choice that the point does not matter to.
+        /// Probability among distant lights; of placed ones where the point does not matter.
         probability: float,
-        /// Bit trail of a placed light in the tree: bit k is set where the light is in the second child at level k. Lower 32 bits.
+        /// Lower 32 bits of a placed light's trail: bit k is set for the second child at level k.
         trail_low: uint,
         /// Upper 32 bits.
         trail_high: uint,
@@ -54,17 +56,17 @@ records! {
         kind: uint,
         /// Triangle, rectangle, sphere: index of its instance; else `INVALID`.
         instance: uint,
-        /// Triangle, rectangle, sphere: index in the instance's mesh; environment: number of portals, whose records follow it.
+        /// Emissive surface: index in the mesh; environment: number of portals, which follow it.
         primitive: uint,
         /// Flags `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`, and those of parts.
         flags: uint,
-        /// Triangle, rectangle, sphere: distance from its surface at which a light sample ends, scene units: a bound on rounding, so that the shadow ray does not
-        /// hit the light itself.
+        /// Distance from an emissive surface at which its light samples end, scene units: a bound
+        /// on rounding, so that the shadow ray does not hit the light itself.
         lift: float,
     }
 
-    /// A node of the light tree: emission bounds of the lights below it. They lie in a bounding sphere, their normals within an angle o of an axis, and emission
-    /// ends at an angle e beyond that.
+    /// A node of the light tree: emission bounds of the lights below it. They lie in a sphere,
+    /// their normals within an angle o of an axis, and emission ends at an angle e beyond that.
     LightNode: Array(buffer: "LightNodes", access: "readonly", align: 16) {
         /// Centre of the bounding sphere.
         center: vec3,
@@ -80,7 +82,7 @@ records! {
         sin_o: float,
         /// Cosine of e.
         cos_e: float,
-        /// Inner node: index of its first child, which the second follows; leaf: index of its light; with flags above.
+        /// Inner node: index of the first of two children; leaf: index of its light; with flags.
         link: uint,
     }
 }

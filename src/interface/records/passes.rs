@@ -1,4 +1,4 @@
-//! Parameters of the passes of a real-time frame, one record per pass. Each holds the address of the `FrameParams` that all share.
+//! Parameters of the passes of a frame, one record per pass, with the address of the `FrameParams`.
 
 records! {
     "passes" values {
@@ -10,7 +10,7 @@ records! {
     AoTraceParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
-        /// Ambient visibility of each ray of the launch, a float. Unused when each pixel has one ray.
+        /// A float per ray of the launch: ambient visibility. Unused when each pixel has one ray.
         samples: address,
         /// Estimates of this frame, 8 bytes per pixel.
         current: address,
@@ -34,9 +34,9 @@ records! {
         radius_scale: float,
         /// Share of the radius over which occlusion fades out before it.
         fade: float,
-        /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer to the pixel.
+        /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer.
         step_exponent: float,
-        /// Factor of distances along the view beyond 1: what lies far behind or before the pixel occludes less, as if it was thin.
+        /// Factor of distances along the view beyond 1: what is far behind or before occludes less.
         thinness: float,
         /// Exponent of the ambient visibility.
         visibility_exponent: float,
@@ -64,7 +64,7 @@ records! {
         moved_count: uint,
         /// Strength with which moving objects shorten histories; 0: none.
         moved_weight: float,
-        /// Half width of history clamping near moving objects, in standard errors of the neighbourhood's mean; 0: no clamping.
+        /// Half width of clamping near moving objects, in standard errors of the mean; 0: none.
         clamp_width: float,
         /// Padding to a multiple of 8 bytes.
         reserved: float,
@@ -106,7 +106,7 @@ records! {
         radius: uint,
         /// Samples that a filtered value should average: the box grows until it holds this many.
         samples: float,
-        /// Convergence of the sampler: the variance of the mean of n samples falls as `n^-(1 + evenness)`.
+        /// Convergence of the sampler: the variance of n samples falls as `n^-(1 + evenness)`.
         evenness: float,
     }
 
@@ -128,9 +128,10 @@ records! {
 
     /// Parameters of `seen`.
     SeenParams: Block(access: "readonly", align: 8) {
-        /// Address of a `FrameParams`: the G-buffer of this frame is the other image's, the previous frame is this image's last one.
+        /// Address of a `FrameParams`: this frame's G-buffer is the other image's, the previous
+        /// frame this image's last one.
         frame: address,
-        /// Two `uint`: pixels of the other image that show a surface, and those of them whose surface this image shows as well.
+        /// Two `uint`: pixels of the other image with a surface, and how many this one shows too.
         counts: address,
         /// One of so many pixels is counted.
         stride: uint,

@@ -6,7 +6,7 @@ use super::queue::QueueRecord;
 
 records! {
     "path" includes "queue" "path_options" "lights" values {
-        /// Phase of a path: what it has met so far are mirrors and glass, where it went on as the G-buffer's rays do.
+        /// Phase of a path that has met mirrors and glass alone, and followed the G-buffer's rays.
         SIGNAL_SEEN: float = 0.0;
         /// Phase of a path: as before, but it went another way.
         SIGNAL_ASIDE: float = 1.0;
@@ -20,7 +20,7 @@ records! {
 
     /// An environment map in equirectangular projection.
     EnvironmentRecord: Structure {
-        /// A `vec4` per texel: linear radiance, and the weight for importance sampling; 0: the environment is constant.
+        /// A `vec4` per texel: linear radiance, and the sampling weight; 0: a constant environment.
         texels: address,
         /// Floats: the sampling table (path/map.glsl).
         table: address,
@@ -48,8 +48,8 @@ records! {
         distant_lights: uint,
         /// The `LightRecord`s: placed lights, then distant ones.
         lights: address,
-        /// Uints: for each instance of the scene the index in this table at which the lights of its primitives begin, or `INVALID`; then the light of each
-        /// primitive, or `INVALID`.
+        /// Uints: for each instance the index in this table at which its primitives begin, or
+        /// `INVALID`; then the light of each primitive, or `INVALID`.
         light_of: address,
         /// `PathRecord` of each ray of the queue that is traced.
         states: address,
@@ -75,13 +75,13 @@ records! {
         lens_radius: float,
         /// Focus distance along the view, scene units.
         focus: float,
-        /// One of `VIEW_*`: the surface property that is rendered in place of radiance; 0: radiance.
+        /// One of `VIEW_*`: the surface property rendered in place of radiance; 0: radiance.
         view: uint,
         /// `LightNode`s of the tree over placed lights.
         light_tree: address,
         /// A `vec2` per path: width and spread of its ray cone (path/cone.glsl).
         cones: address,
-        /// The cumulative distribution of placed lights, `placed_lights + 1` uints, then that of distant ones, `distant_lights + 1`.
+        /// Cumulative distributions of placed lights (`placed_lights + 1` uints) and distant ones.
         light_starts: address,
         /// Index of the first directional light.
         first_disk: uint,
@@ -89,19 +89,19 @@ records! {
         disk_count: uint,
         /// A `uvec4` per path: stack of the volumes that it is in (path/media.glsl).
         media: address,
-        /// A float per path: distance since its last bounce, through thin walls that transmit without scattering, scene units.
+        /// A float per path: distance since its last bounce, through thin clear walls, scene units.
         straight: address,
         /// Stack of the volumes that the camera is in.
         camera_media: uvec4,
         /// Ambient radiance, linear RGB, with `WITH_AMBIENT`.
         ambient_color: vec3,
-        /// 1: ambient occlusion darkens all light of a path's first surface, with `WITH_OCCLUDED_LIGHT`.
+        /// 1: ambient occlusion darkens all light of a first surface, with `WITH_OCCLUDED_LIGHT`.
         occludes_all: uint,
         /// The queue of shadow rays that continue behind a thin wall.
         later: QueueRecord,
         /// `contributions` of the queue `later`.
         later_contributions: address,
-        /// A float per path: probability density of light sampling at its last bounce for the environment in its direction.
+        /// A float per path: light sampling density of its direction to the environment.
         sky_pdfs: address,
         /// The queue of rays of ambient light, with `WITH_AMBIENT`.
         ambient: QueueRecord,
@@ -109,7 +109,7 @@ records! {
         ambient_contributions: address,
         /// A `SignalRecord` per path, with `WITH_SIGNAL`.
         signals: address,
-        /// With `WITH_SIGNAL` a `vec4` per shadow ray: what it adds to the diffuse part, divided by the albedo, if it is unoccluded; else 0.
+        /// With `WITH_SIGNAL` a `vec4` per shadow ray: its diffuse part over the albedo, or 0.
         diffuse_contributions: address,
         /// `diffuse_contributions` of the queue `later`.
         later_diffuse_contributions: address,
@@ -121,7 +121,7 @@ records! {
         distant_contributions: address,
         /// `diffuse_contributions` of the queue `distant_shadow`.
         distant_diffuse_contributions: address,
-        /// A float per path, with `WITH_LIGHT_GROUPS`: share of placed lights in the light samples of its last bounce.
+        /// A float per path, with `WITH_LIGHT_GROUPS`: placed lights' share in its last samples.
         placed_shares: address,
         /// The options that are numbers.
         options: PathOptionsRecord,
@@ -135,22 +135,23 @@ records! {
         reserved: uint,
     }
 
-    /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first
-    /// one whose surface scatters light, which is seen directly or by mirrors and glass.
+    /// The signal of a path of a frame, beside its radiance, without directly visible emission. Its
+    /// vertex is the first whose surface scatters light, seen directly or by mirrors and glass.
     SignalRecord: Words {
         /// Emission and background seen directly, linear RGB.
         direct: vec3,
         /// 1 if the camera ray hit the scene.
         covered: float,
-        /// The part of the path's radiance that this vertex reflects diffusely, divided by its diffuse albedo.
+        /// Part of the radiance that this vertex reflects diffusely, divided by its diffuse albedo.
         diffuse: vec3,
-        /// Distance from the vertex to the next one, scene units, infinite if there is none; `SIGNAL_UNKNOWN` if that direction tells nothing about reflections.
+        /// Distance from the vertex to the next one, scene units, infinite if there is none;
+        /// `SIGNAL_UNKNOWN` if that direction tells nothing about reflections.
         reflected_distance: float,
-        /// Its diffuse albedo; 0 where the diffuse part is not kept apart.
+        /// Diffuse albedo of the vertex; 0 where the diffuse part is not kept apart.
         albedo: vec3,
         /// One of `SIGNAL_*`: how far the path is.
         phase: float,
-        /// Of what comes from the sampled direction: the diffuse part, divided by the albedo, over all of it.
+        /// Share of the diffuse part, divided by the albedo, in what the sampled direction brings.
         share: vec3,
         /// Padding to a multiple of 16 bytes.
         reserved: float,
@@ -160,13 +161,13 @@ records! {
     PathRecord: Words {
         /// Throughput, linear RGB.
         throughput: vec3,
-        /// Probability density of BSDF sampling for the ray's direction; negative: no other technique could have sampled it, so it has no MIS weight.
+        /// Density of BSDF sampling for the direction; negative: no other technique samples it.
         pdf: float,
         /// Index of its camera ray.
         index: uint,
-        /// Number of bounces in the lower 16 bits; above them the number of surfaces passed straight through, which are no bounces.
+        /// Number of bounces in the lower 16 bits, above it that of surfaces passed straight.
         depth_passes: uint,
-        /// Product of the squared relative indices of refraction so far: Russian roulette divides it out.
+        /// Product of the squared relative indices of refraction; Russian roulette divides it out.
         eta_scale: float,
         /// Material of the volume that the path is in, or `INVALID`.
         medium: uint,

@@ -9,7 +9,7 @@ records! {
         rays: address,
         /// A `uint` per ray, which the callback of the stream that traces the queue receives.
         tags: address,
-        /// A `uint`: number of rays in the queue. The host clears it, and allocates enough memory for all rays of a launch.
+        /// A `uint`: number of rays in the queue, cleared by the host, at most those of a launch.
         count: address,
     }
 }

@@ -1,4 +1,4 @@
-//! Parameters of the passes of a real-time frame of radiance, and of those that resolve any frame, one record per pass.
+//! Parameters of the passes of a frame of radiance, and of those that resolve any frame.
 
 use super::queue::QueueRecord;
 
@@ -12,12 +12,13 @@ records! {
 
     /// A ray of the G-buffer on its way behind mirrors and glass.
     GuideRayRecord: Words {
-        /// Rows of the product of reflections so far, each with a number besides: the distance from the camera in scene units, the number of bounces (bits of a
-        /// `uint`), and 1 where the previous image did not show what the pixel does, else 0.
+        /// Rows of the product of reflections so far, each with a number besides: the distance from
+        /// the camera in scene units, the number of bounces (bits of a `uint`), and 1 where the
+        /// previous image did not show what the pixel does, else 0.
         rows: vec4[3],
     }
 
-    /// What a pixel's ray hits, with the ids of the scene.
+    /// The hit of a pixel's ray, with the ids of the scene.
     KnownHit: Words {
         /// Ray parameter; infinite for a miss, which has no other fields.
         t: float,
@@ -37,17 +38,18 @@ records! {
         next: QueueRecord,
         /// A `GuideRayRecord` per ray of the queue that is traced; 0: no ray goes on.
         states: address,
-        /// The same of the queue that is filled.
+        /// A `GuideRayRecord` per ray of the queue that is filled.
         next_states: address,
         /// A `uint` per ray of the queue that is traced: its pixel.
         tags: address,
-        /// Output, a `vec4` per pixel: diffuse albedo, linear, and roughness of reflections, 0 to 1.
+        /// Output, a `vec4` per pixel: linear diffuse albedo, and roughness of reflections, 0 to 1.
         materials: address,
         /// Output, a `vec4` per pixel: emission and background seen directly, linear, and coverage.
         direct: address,
         /// Output, a `KnownHit` per pixel: what is seen directly; or 0.
         known_hits: address,
-        /// Output: the number of pixels whose surface was not seen in the previous image, that of pixels that show a surface, counted in one of `LIST_PART`, and each of the former; or 0.
+        /// Output: the number of pixels whose surface was not seen in the previous image, that of
+        /// pixels that show a surface, counted in one of `LIST_PART`, and each of the former; or 0.
         list: address,
         /// Tiles in a row of the pixels that are sampled in a frame.
         tiles_x: uint,
@@ -65,11 +67,11 @@ records! {
         diffuse: address,
         /// Output, a `RadianceRecord` per pixel: the rest.
         specular: address,
-        /// Output, a float per pixel: distance of what is reflected, scene units; `SIGNAL_UNKNOWN` if it is not known.
+        /// Output, a float per pixel: distance of reflections, scene units, or `SIGNAL_UNKNOWN`.
         distances: address,
-        /// Output, two `vec4` per pixel: samples of the whole signal since the image came to rest; 0: not kept.
+        /// Output, two `vec4` per pixel: samples of the whole signal at rest; 0: not kept.
         rest: address,
-        /// Output, three `vec4` per pixel: the parts of which the samples at rest consist; 0: not kept.
+        /// Output, three `vec4` per pixel: the parts of the samples at rest; 0: not kept.
         rest_parts: address,
         /// 1: it has not rested before.
         starts: uint,
@@ -79,7 +81,7 @@ records! {
         tiles_x: uint,
         /// The first path of the launch that is gathered.
         first_path: uint,
-        /// The pixels that are gathered, among those that are sampled in a frame: a `uint` each; 0: those of the launch.
+        /// A `uint` per gathered pixel among those sampled in a frame; 0: those of the launch.
         listed: address,
     }
 
@@ -87,17 +89,17 @@ records! {
     RadianceTemporalParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
-        /// This frame's samples, a `RadianceRecord` per pixel: diffuse reflection divided by the albedo.
+        /// This frame's diffuse reflection divided by the albedo, a `RadianceRecord` per pixel.
         diffuse: address,
-        /// The same of the rest.
+        /// This frame's rest of the signal, a `RadianceRecord` per pixel.
         specular: address,
         /// Histories of the previous frame.
         previous_diffuse: address,
-        /// Of the rest.
+        /// Histories of the rest of the signal in the previous frame.
         previous_specular: address,
         /// Output: histories of this frame.
         diffuse_history: address,
-        /// Of the rest.
+        /// Output: histories of the rest of the signal in this frame.
         specular_history: address,
         /// Distance of what is reflected, a float per pixel.
         distances: address,
@@ -113,9 +115,9 @@ records! {
         moved_count: uint,
         /// Strength with which moving objects shorten histories; 0: none.
         moved_weight: float,
-        /// Half width of history clamping, in standard deviations of the neighbourhood; 0: no clamping.
+        /// Half width of history clamping, in standard deviations of the neighbourhood; 0: none.
         clamp_width: float,
-        /// Maximum samples of a history before this frame's: fewer than usual after lights have changed.
+        /// Maximum samples of a history before this frame's: few after lights have changed.
         most_past: float,
     }
 
@@ -151,7 +153,7 @@ records! {
         visibility: address,
         /// Output, two `vec4` per pixel: value, number of frames, and coverage.
         history: address,
-        /// The same of the previous frame.
+        /// Histories of the previous frame.
         previous_history: address,
         /// Samples since the image came to rest (`GatherParams`); 0: none.
         rest: address,
@@ -161,7 +163,7 @@ records! {
         resolved: address,
         /// `MovedRecord`s of this frame.
         moved: address,
-        /// Histories of diffuse reflection, a `RadianceRecord` per pixel, where light may have changed since the previous frame; 0: it has not.
+        /// Histories of diffuse reflection where light may have changed, `RadianceRecord`; or 0.
         changed: address,
         /// Number of `MovedRecord`s.
         moved_count: uint,
@@ -171,13 +173,13 @@ records! {
         has_history: uint,
         /// Maximum number of frames of a history in motion.
         most_frames: float,
-        /// The same of a pixel in which nothing moves.
+        /// Maximum number of frames of a history in which nothing moves.
         most_still_frames: float,
         /// Padding.
         reserved: float,
-        /// Where this frame's samples lie from the middle of their pixels, pixels; 0 where each has a place of its own.
+        /// Offset of the samples from their pixels' centres, pixels; 0 where each has its own.
         samples_at: vec2,
-        /// Half width of the clamp of a history in motion, in standard deviations of the neighbourhood.
+        /// Half width of the clamp of histories in motion, in their standard deviations.
         clamp_width: float,
         /// Minimum weight of a frame at rest.
         least_weight: float,
@@ -201,9 +203,9 @@ records! {
         frame: address,
         /// Two `vec4` per pixel: samples since the image came to rest.
         rest: address,
-        /// Output: of each pixel the mean of those samples and the variance of the mean, two floats.
+        /// Output, two floats per pixel: mean of those samples, and variance of the mean.
         to: address,
-        /// Convergence of the sampler: the variance of the mean over n frames falls as `n^-(1 + evenness)`.
+        /// Convergence of the sampler: the variance of n frames falls as `n^-(1 + evenness)`.
         evenness: float,
         /// Padding to a multiple of 8 bytes.
         reserved: float,
@@ -227,7 +229,7 @@ records! {
     RestSamplesParams: Block(access: "readonly", align: 8) {
         /// Address of the `FrameParams`.
         frame: address,
-        /// Ambient visibility of each sample of the launch, a float; negative where its camera ray missed.
+        /// A float per sample of the launch: ambient visibility; negative for camera rays' misses.
         samples: address,
         /// In and out, two `vec4` per pixel: samples since the image came to rest.
         rest: address,

@@ -6,9 +6,10 @@ records! {
         INVALID: uint = u32::MAX;
     };
 
-    /// A ray: the points `origin + t * direction` with `tmin < t < tmax`. 32 bytes, the record of RAYS.bin. A ray with `tmax <= tmin` is inactive: it is not
-    /// traced, and its callback reports a miss. The direction need not be of unit length; `t` is measured in units of it. Lengths are scene units (metres in
-    /// glTF), relative to the scene's origin (`Scene::origin`).
+    /// A ray: the points `origin + t * direction` with `tmin < t < tmax`, 32 bytes as in RAYS.bin.
+    /// A ray with `tmax <= tmin` is inactive: it is not traced, and its callback reports a miss.
+    /// The direction need not be of unit length; `t` is measured in units of it. Lengths are scene
+    /// units (metres in glTF), relative to the scene's origin (`Scene::origin`).
     Ray: Structure {
         /// Origin.
         origin: vec3,
@@ -22,7 +23,7 @@ records! {
 
     /// The result of tracing a ray. 20 bytes, the record of HITS.bin.
     Hit: Structure {
-        /// Ray parameter of the hit; infinite for a miss. Any-hit streams write 0 for an occluded ray.
+        /// Ray parameter of the hit; infinite for a miss. Any-hit streams write 0 if occluded.
         t: float,
         /// Index into the scene's instances; all ones for a miss.
         instance: uint,
@@ -40,8 +41,9 @@ records! {
         scene: address,
         /// Address of the pass's own parameters.
         pass: address,
-        /// Address of ray `first`, if the rays of this launch are in memory: those of a queue, or the compute tracer's own; 0 for streams that generate their
-        /// rays. When camera rays are rasterized: the visibility buffer (trace/visibility.glsl).
+        /// Address of ray `first`, if the rays of this launch are in memory: those of a queue, or
+        /// the compute tracer's own; 0 for streams that generate theirs. When camera rays are
+        /// rasterized: the visibility buffer (trace/visibility.glsl).
         rays: address,
         /// A `uint`: number of rays in the queue; 0: `count` is the number.
         queued: address,

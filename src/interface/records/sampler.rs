@@ -8,11 +8,11 @@ records! {
         CAMERA_LENS: uint = 1;
         /// Direction of an ambient occlusion ray.
         AO_DIRECTION: uint = 2;
-        /// Used in place of a dimension pair for the random number of each ray that decides stochastic alpha.
+        /// Dimension pair of the random number of each ray that decides stochastic alpha.
         RAY_SEED: uint = 3;
         /// Length of a ray of ambient light, where occlusion falls off with distance.
         AO_LENGTH: uint = 4;
-        /// First dimension pair of a path: those of vertex n begin at `PATH_FIRST + n * PATH_STRIDE`.
+        /// First dimension pair of a path: vertex n begins at `PATH_FIRST + n * PATH_STRIDE`.
         PATH_FIRST: uint = 8;
         /// Number of dimension pairs per path vertex.
         PATH_STRIDE: uint = 8;

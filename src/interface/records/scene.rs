@@ -1,5 +1,6 @@
-//! The scene in device memory, reached from one root by device address. Matrices are the three rows of an affine map. A group is a
-//! bottom-level acceleration structure (BLAS), and consists of submeshes; BLAS space is the space of its vertices.
+//! The scene in device memory, reached from one root by device address. Matrices are the three rows
+//! of an affine map. A group is a bottom-level acceleration structure (BLAS), and consists of
+//! submeshes; BLAS space is the space of its vertices.
 
 use super::super::enumerations::Texels;
 
@@ -53,7 +54,7 @@ records! {
         bounds_max: vec4,
         /// `MipRecord` of each texture; 0: unused.
         mips: address,
-        /// Compute tracer: rays that are suspended where the driver ends loops early; 0: it does not.
+        /// Compute tracer: suspended rays where the driver ends loops early; 0: it does not.
         suspended: address,
     }
 
@@ -63,15 +64,15 @@ records! {
         group_to_world: vec4[3],
         /// World to BLAS space, three rows.
         world_to_group: vec4[3],
-        /// A `uint` per primitive of the BLAS: its submesh, counted from `first_submesh`; 0 when there is only one.
+        /// A `uint` per primitive of the BLAS: submesh, counted from `first_submesh`; or 0 for one.
         submesh_of: address,
         /// Index into `SceneRoot.submeshes`.
         first_submesh: uint,
-        /// Index of the instance in the scene; `INVALID`: several were baked into one BLAS, and each submesh has its own.
+        /// Index of the instance in the scene; `INVALID`: each submesh of the BLAS has its own.
         scene_instance: uint,
         /// Compute tracer, binary BVH kernel: root node of the BLAS.
         root: uint,
-        /// Hardware tracers: index of the first primitive of the second BLAS geometry, which is alpha tested.
+        /// Hardware tracers: first primitive of the second BLAS geometry, which is alpha tested.
         opaque_count: uint,
         /// Padding to a multiple of 16 bytes.
         reserved0: uint,

@@ -1,5 +1,4 @@
-//! `antialias`: the mean over frames whose samples lie at different places within the pixels, and
-//! at rest what the image converges to.
+//! `antialias`: the mean over frames of moving sample positions; at rest the converging image.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
@@ -19,8 +18,7 @@ const RADIANCE_FRAMES: f32 = 4.0;
 const STILL_FRAMES: f32 = 16.0;
 /// The same after lights or materials have changed.
 const NEW_LIGHT_FRAMES: f32 = 2.0;
-/// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs
-/// from the one before by the edges that its filter sees.
+/// Minimum weight of a frame of radiance at rest, which differs in its filter's edges.
 const MIN_WEIGHT: f32 = 0.25;
 /// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
 const CLAMP_WIDTH: f32 = 1.25;
@@ -48,8 +46,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Number of samples as which each frame in motion counts at rest: 8 where the history has its
-/// maximum number of frames.
+/// Number of samples as which a frame in motion counts at rest: 8 for a full history.
 const MOTION_SAMPLES: f32 = 8.0 / RADIANCE_FRAMES;
 
 /// How much a long frame of radiance at rest counts, which is the filtered mean of all samples so
@@ -57,8 +54,7 @@ const MOTION_SAMPLES: f32 = 8.0 / RADIANCE_FRAMES;
 /// what the filter does at edges and hide its specks, and the mean has nearly the noise of all
 /// samples: by the square 1.07 times that after four long frames, by higher powers less, and more
 /// specks. Where samples are many there are none, and frames that add a constant part would leave
-/// sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth, 1.01 by
-/// the twenty-fourth.
+/// sqrt(2p / (2p - 1)) times their noise: 1.095 for p = 3, 1.02 for 12, 1.01 for 24.
 struct LongFrame {
     before: f32,
     after: f32,
@@ -90,7 +86,7 @@ impl Pass for Antialias {
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
-        // which image it resolves, and how a long frame counts
+        // The image that it resolves, and how a long frame counts.
         self.moved.write(0, bytemuck::cast_slice(frame.moved))?;
         let input = resources.address(self.input);
         let is_composed = self.input == Resource::Composed;
@@ -98,7 +94,18 @@ impl Pass for Antialias {
         let long = LongFrame::from_frame(frame).filter(|_| is_light_at_rest);
         let of_long = |f: fn(&LongFrame) -> f32| long.as_ref().map_or(0.0, f);
 
-        // how many frames it averages follows from the signal and from what has changed
+        // The number of frames that it averages follows from the signal and from what has changed.
+        let has_new_light = frame.plan.has_new_light();
+        let is_changed = is_composed && (has_new_light || !frame.moved.is_empty());
+        let most_frames = if !frame.settings.antialias {
+            1.0
+        } else if has_new_light {
+            NEW_LIGHT_FRAMES
+        } else if is_composed {
+            RADIANCE_FRAMES
+        } else {
+            MAX_FRAMES
+        };
         self.params.write(&AntialiasParams {
             previous_to_camera: frame.previous_to_camera,
             frame: frame.params,
@@ -110,20 +117,12 @@ impl Pass for Antialias {
             denoised: if frame.plan.has_denoised { resources.address(Resource::Denoised) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             moved: self.moved.address(),
-            changed: match is_composed && (frame.plan.has_new_light() || !frame.moved.is_empty()) {
-                true => resources.address(Resource::DiffuseHistory),
-                false => 0,
-            },
+            changed: if is_changed { resources.address(Resource::DiffuseHistory) } else { 0 },
             moved_count: frame.moved.len() as u32,
             uncovers: frame.plan.has_moved.into(),
             has_history: frame.plan.has_resolved.into(),
-            most_frames: match frame.settings.antialias {
-                true if frame.plan.has_new_light() => NEW_LIGHT_FRAMES,
-                true if is_composed => RADIANCE_FRAMES,
-                true => MAX_FRAMES,
-                false => 1.0,
-            },
-            most_still_frames: if frame.plan.has_new_light() { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
+            most_frames,
+            most_still_frames: if has_new_light { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
             reserved: 0.0,
             samples_at: if frame.plan.placement.spreads { [0.0; 2] } else { frame.plan.offset },
             clamp_width: CLAMP_WIDTH,

@@ -1,6 +1,5 @@
-//! Debug views: passes that write the displayed image themselves. They are compiled and run only
-//! for frames that show them, and no other pass reads what they write. Each is a file here and a
-//! variant of [`DisplayMode`], which [`super::debug_view`] brings together.
+//! Debug views: passes that write the displayed image themselves, compiled and run only for frames
+//! that show them. Each is a file here and a variant of [`DisplayMode`] ([`super::debug_view`]).
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
@@ -14,7 +13,7 @@ use crate::realtime::settings::Settings;
 use crate::shaders::ComputeShader;
 use crate::tracer::Tracer;
 
-/// What a debug view declares. Its shader takes `DebugParams`.
+/// A debug view. Its shader takes `DebugParams`.
 pub struct DebugView {
     /// Resources of this frame that it reads: what it shows stays until one of them changes.
     pub reads: &'static [Resource],

@@ -1,5 +1,4 @@
-//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and
-//! without alpha for files.
+//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory.
 
 use super::debug_view;
 use crate::colour::srgb_byte;
@@ -19,12 +18,7 @@ impl DisplayMode {
     /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
-            DisplayMode::Result
-            | DisplayMode::Unfiltered
-            | DisplayMode::Samples
-            | DisplayMode::Variance
-            | DisplayMode::Depth
-            | DisplayMode::Rays => Colour::Grey,
+            Self::Result | Self::Unfiltered | Self::Samples | Self::Variance | Self::Depth | Self::Rays => Colour::Grey,
             _ => Colour::Rgb,
         }
     }
@@ -75,8 +69,7 @@ struct DisplayPass {
     thresholds: Buffer,
 }
 
-/// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose
-/// input keeps its memory until this pass; else for all other buffers.
+/// The pass over all pixels, after all others; for [`DisplayMode::Rays`] alone if `shows_rays`.
 pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = DisplayPass {
@@ -164,7 +157,7 @@ fn thresholds() -> [f32; 256] {
 mod tests {
     use super::*;
 
-    /// What the shader does with a perfect guess, around each place where a byte changes.
+    /// The shader's result for a perfect guess, around each position where a byte changes.
     #[test]
     fn thresholds_are_those_of_the_encoding() {
         let table = thresholds();

@@ -1,5 +1,4 @@
-//! `filter`: averages over neighbours on the same surface, in one step or several, and turns
-//! estimates into the result.
+//! `filter`: averages over neighbours on the same surface, and turns estimates into the result.
 
 use std::sync::Arc;
 

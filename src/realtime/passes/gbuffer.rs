@@ -1,5 +1,4 @@
-//! `gbuffer`: the surface at each pixel's centre, by camera rays that are traced or rasterized. It
-//! is skipped while neither the camera nor the scene changes.
+//! `gbuffer`: the surface at each pixel's centre, by camera rays; skipped if nothing moves.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};

@@ -25,7 +25,7 @@ struct Shared {
     _tables: [Buffer; 3],
 }
 
-/// What a pass of the pipeline does.
+/// The work of a pass of the pipeline.
 enum Work {
     /// Copies the result of the previous frame.
     Keep,

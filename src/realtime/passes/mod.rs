@@ -1,5 +1,4 @@
-//! The passes of a frame, one file each: the resources that a pass reads and writes, its
-//! parameters, and how it is recorded.
+//! The passes of a frame, one file each: resources, parameters, and how they are recorded.
 
 pub mod antialias;
 pub mod ao_trace;

@@ -1,6 +1,5 @@
-//! `nlmeans`: non-local means of all samples of ambient visibility since the image came to rest,
-//! after `rest_noise`, which says how well each pixel is known. Stills are denoised by the same
-//! shaders ([`crate::denoise`]).
+//! `nlmeans`: non-local means of all samples of ambient visibility at rest, after `rest_noise`,
+//! which says how well each pixel is known. Stills share its shaders ([`crate::denoise`]).
 
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
@@ -12,9 +11,8 @@ use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, ComputeShader};
 use crate::tracer::Tracer;
 
-/// Assumed convergence of samplers: the variance of the mean of n samples falls as
-/// `n^-(1 + EVENNESS)`. Of 64 samples of ambient occlusion it is between a half and 1.5 times that in
-/// six scenes (docs/denoising.md); weights need to know it no better.
+/// Assumed convergence of samplers: the variance of n samples falls as `n^-(1 + EVENNESS)`. It is
+/// within half of that for 64 samples of ambient occlusion in six scenes (docs/denoising.md).
 pub const EVENNESS: f32 = 0.33;
 
 /// The shader for images of so many channels, 1 or 3.

@@ -1,5 +1,4 @@
-//! `nodes`: a heat map of the BVH nodes that camera rays visit with the compute tracer. It has its
-//! own traversal kernel.
+//! `nodes`: a heat map of the BVH nodes that camera rays visit, by a traversal kernel of its own.
 
 use super::debug::DebugView;
 use crate::error::Result;

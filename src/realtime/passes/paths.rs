@@ -1,5 +1,5 @@
-//! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts.
-//! The host reads after some bounces how many paths are left.
+//! `paths`: paths of the pixels that are sampled, and means of their parts. The host counts paths
+//! left.
 
 use std::sync::Arc;
 
@@ -43,8 +43,7 @@ pub fn stage(
     settings: &Settings,
     has_rest: bool,
 ) -> Result<Stage> {
-    // a range is a launch, or several of the same pixels; beyond it there is room for paths of
-    // uncovered pixels
+    // a range is a launch, or several of the same pixels, and has room for uncovered ones
     let pixels = settings.launch_rays.min(paths.capacity()) / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
     let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
     let gather = || Params::new(tracer.device(), "parameters of gathering");

@@ -1,5 +1,5 @@
-//! `radiance_filter`: averages diffuse reflection, and then the rest, over neighbours on the same
-//! surface (the shader `denoise`, with which stills are denoised).
+//! `radiance_filter`: averages diffuse reflection, and the rest, over neighbours (shader
+//! `denoise`).
 
 use std::sync::Arc;
 
@@ -14,8 +14,7 @@ use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// At rest the box has so many pixels at least, however many samples they have: what detail is, and
-/// what noise, is told by them.
+/// Minimum pixels of the box at rest, however many samples: they tell detail from noise.
 const MIN_PIXELS: f32 = 9.0;
 
 /// One step of the filter of one part.
@@ -27,9 +26,8 @@ struct RadianceFilter {
     to: Resource,
 }
 
-/// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the
-/// rest is black and is left alone), and the images that hold the results: diffuse reflection and
-/// the rest.
+/// The steps of the filter over the tiles of the image, and the images that hold the results:
+/// diffuse reflection and the rest, which is black without `has_specular` and left alone.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::DENOISE.specialized(device, &settings.filter.specialization())?);

@@ -1,5 +1,4 @@
-//! `radiance_temporal`: adds this frame's samples of diffuse reflection, and of the rest, to the
-//! reprojected histories of the same surface.
+//! `radiance_temporal`: adds samples of diffuse reflection and the rest to reprojected histories.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
@@ -11,8 +10,7 @@ use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// Half width of history clamping, in standard deviations of the samples nearby, relative to
-/// [`crate::realtime::Settings::clamp`].
+/// Half width of history clamping, in standard deviations, relative to the settings' `clamp`.
 const CLAMP_SCALE: f32 = 0.5;
 
 struct RadianceTemporal {

@@ -1,5 +1,4 @@
-//! `rejected`: a colour for why a pixel has no history, by the tests that temporal accumulation
-//! makes.
+//! `rejected`: colours for why pixels have no history, by the tests of temporal accumulation.
 
 use super::debug::DebugView;
 use crate::error::Error;

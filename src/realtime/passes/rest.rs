@@ -1,5 +1,4 @@
-//! `rest`: adds this frame's samples of ambient visibility to those since the image came to rest.
-//! (The samples of radiance are added by `paths`.)
+//! `rest`: adds samples of ambient visibility to those at rest; `paths` does so for radiance.
 
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};

@@ -1,6 +1,5 @@
-//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills:
-//! `primary` and `occlusion`. In place of the passes that a frame in motion needs, whose samples
-//! lie at one place in their pixels and which take longer than as many samples of a still.
+//! `rest_samples`: several samples of each pixel in a long frame at rest, by the passes of stills,
+//! `primary` and `occlusion`, which take less time than the passes of frames in motion.
 
 use crate::error::Result;
 use crate::film::block::Block;
@@ -15,12 +14,10 @@ use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::shaders::{self, LANES};
 use crate::tracer::Push;
 
-/// Added to the seed, so that frames at rest and a still of the same seed, which may be its
-/// reference, have samples of their own.
+/// Added to the seed, so that frames at rest do not share samples with a still, their reference.
 const SEED: u32 = 0x7265_7374;
 
-/// The pipelines and their memory, made when the first long frame comes: who never rests does
-/// without.
+/// The pipelines and their memory, made when the first long frame comes.
 struct Traced {
     rays: AoRays,
     has_entry_points: bool,
@@ -41,7 +38,7 @@ pub fn stage(block: Block, spp: u32, launch_rays: u32) -> Stage {
     let ranges = Range::launches(block.rays() * spp, spp, launch_rays);
     let most = ranges.iter().map(|r| r.count).max().unwrap_or(0);
     let pass = RestSamples { traced: None, sample_bits: spp.ilog2(), most };
-    Stage::new(vec![Box::new(pass)], ranges).of_long_frames()
+    Stage::new(vec![Box::new(pass)], ranges).in_long_frames()
 }
 
 impl Traced {

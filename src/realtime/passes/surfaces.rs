@@ -1,5 +1,4 @@
-//! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters
-//! light, seen directly or by mirrors and glass, its material, and what is seen directly.
+//! `surfaces`: the G-buffer of radiance: surfaces behind pixels that scatter light, and materials.
 
 use std::sync::Arc;
 
@@ -25,8 +24,7 @@ struct Surfaces {
     pixels: u32,
 }
 
-/// The pass over all pixels of an image. It lists those that are `uncovered`, where there are
-/// histories.
+/// The pass over all pixels of an image, which lists `uncovered` ones if there are histories.
 pub fn stage(
     tracer: &Tracer,
     scene: &Scene,

@@ -1,7 +1,6 @@
-//! Pixels whose surface was not seen in the previous image. Where a camera or an object in motion
-//! uncovers something, one path would have to do; these pixels have some more
-//! ([`Counts::listed_bits`]), in the same launch as those of all pixels. The pass `surfaces` lists
-//! them, and `paths` reads the list.
+//! Pixels whose surface was not seen in the previous image, which a camera or object in motion
+//! uncovers. They have more paths ([`Counts::listed_bits`]) in the launch of all pixels. The pass
+//! `surfaces` lists them, and `paths` reads the list.
 
 use std::sync::Arc;
 
@@ -32,8 +31,7 @@ pub struct Counts {
     pub surfaces: u32,
 }
 
-/// Number of paths that uncovered pixels have at most besides, in frames of `samples` of each of so
-/// many pixels.
+/// Maximum number of paths of uncovered pixels besides, in frames of `samples` of each pixel.
 pub fn most_paths(pixels: u32, samples: u32) -> u32 {
     pixels.saturating_mul(samples) / UNCOVERED_SHARE
 }
@@ -51,8 +49,7 @@ impl Uncovered {
         })
     }
 
-    /// Whether uncovered pixels of a frame are listed: it is in motion, and there is a previous
-    /// image.
+    /// Whether a frame lists uncovered pixels: in motion, after a previous image.
     pub fn are_listed(frame: &Frame) -> bool {
         frame.plan.has_moved && frame.plan.has_resolved
     }
@@ -62,7 +59,7 @@ impl Uncovered {
         self.list.address() + 8
     }
 
-    /// What the pass that lists them writes to in a frame.
+    /// The outputs of the pass that lists them in a frame.
     pub fn outputs(&self, frame: &Frame) -> SurfacesParams {
         let list = if Self::are_listed(frame) { self.list.address() } else { 0 };
         SurfacesParams { list, tiles_x: self.sampled.tiles_x(), ..Default::default() }
@@ -89,9 +86,8 @@ impl Uncovered {
 }
 
 impl Counts {
-    /// Log2 of how often each uncovered pixel is in a launch besides, where a pixel has
-    /// `1 << sample_bits` paths and there is room for so many paths more. `None`: there are none, or
-    /// too many.
+    /// Log2 of how often each uncovered pixel is in a launch besides, where a pixel has `1 <<
+    /// sample_bits` paths and there is `room` for more paths. `None`: there are none, or too many.
     pub fn listed_bits(self, sample_bits: u32, room: u32) -> Option<u32> {
         let all = |bits: u32| u64::from(self.uncovered) << bits;
         let fits =

@@ -29,7 +29,7 @@ impl Larsen {
         Ok(Pipeline {
             signal: &Self,
             settings: Settings { primary: Some(primary), ..*settings },
-            frame_samples: FrameSamples::of_visibility(settings, pixels(size)),
+            frame_samples: FrameSamples::for_visibility(settings, pixels(size)),
             extent: extent(tracer, block),
             stages,
             primary_reason,

@@ -1,5 +1,4 @@
-//! The signals that frames are made of, a type each, which owns its stages: ambient visibility,
-//! radiance, and the pipeline of Larsen (2019).
+//! The signals that frames are made of: ambient visibility, radiance, and Larsen's pipeline.
 
 pub mod larsen;
 pub mod radiance;
@@ -11,7 +10,7 @@ use super::plan::Signal;
 use super::resources::Extent;
 use super::settings::Settings;
 
-/// What the frames of a signal are made of, at one image size.
+/// The passes of the frames of a signal, at one image size.
 pub struct Pipeline {
     /// The signal.
     pub signal: &'static dyn Signal,

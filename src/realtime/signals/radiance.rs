@@ -46,12 +46,13 @@ impl Radiance {
     ) -> Result<Pipeline> {
         let block = Block { origin: [0, 0], size };
         let pixels = pixels(size);
-        let frame_samples = FrameSamples::of_radiance(settings, pixels, tracer.device().info.is_cpu());
+        let frame_samples = FrameSamples::for_radiance(settings, pixels, tracer.device().info.is_cpu());
         let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
         let paths = SignalPaths::new(tracer, flat, options, most_paths(sampled, settings, frame_samples))?;
-        let primary_reason = match paths.can_begin_at_known() {
-            true => "paths begin with a camera ray; in motion at what those of the G-buffer hit, which are traced once",
-            false => "paths begin with a camera ray",
+        let primary_reason = if paths.can_begin_at_known() {
+            "paths begin with a camera ray; in motion at what those of the G-buffer hit, which are traced once"
+        } else {
+            "paths begin with a camera ray"
         };
         let is_matte = || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);
         let has_specular = options.white_sky.is_none() && !is_matte();
@@ -72,8 +73,7 @@ impl Radiance {
     }
 }
 
-/// Returns the maximum number of paths of a launch. `sampled`: the pixels that are sampled in a
-/// frame.
+/// Returns the maximum number of paths of a launch, for frames that sample `sampled`.
 fn most_paths(sampled: Block, settings: &Settings, samples: FrameSamples) -> u32 {
     let most = with_uncovered(settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS));
     let spp = samples.most().min(MAX_SAMPLES).next_power_of_two();
@@ -94,10 +94,8 @@ fn stages(
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let has_rest = settings.converges();
-    let uncovered = match settings.history > 1 {
-        true => Some(Arc::new(Uncovered::new(tracer.device(), sampled)?)),
-        false => None,
-    };
+    let uncovered = || Uncovered::new(tracer.device(), sampled).map(Arc::new);
+    let uncovered = (settings.history > 1).then(uncovered).transpose()?;
     let mut stages = vec![
         surfaces::stage(tracer, flat.scene, &paths, block, uncovered.clone(), settings.launch_rays)?,
         paths::stage(tracer, paths, sampled, uncovered, settings, has_rest)?,
@@ -116,7 +114,7 @@ impl Signal for Radiance {
     }
 
     fn frame_samples(&self, settings: &Settings, pixels: u64, is_cpu: bool) -> FrameSamples {
-        FrameSamples::of_radiance(settings, pixels, is_cpu)
+        FrameSamples::for_radiance(settings, pixels, is_cpu)
     }
 
     fn check_display(&self, mode: DisplayMode, settings: &Settings) -> Result<()> {
@@ -129,10 +127,11 @@ impl Signal for Radiance {
     }
 
     fn frames_to_rest(&self, settings: &Settings, samples: &FrameSamples) -> Option<u32> {
-        match settings.converges() {
+        if settings.converges() {
             // the frame before those at rest counts besides
-            true => Some(samples.frames_for(settings.rest_samples) * self.rest_period(settings) + 1),
-            false => settings.frames_to_rest(),
+            Some(samples.frames_for(settings.rest_samples) * self.rest_period(settings) + 1)
+        } else {
+            settings.frames_to_rest()
         }
     }
 
@@ -152,8 +151,7 @@ impl Signal for Radiance {
 
     fn place_samples(&self, history: &History, inputs: &Inputs, progress: &RestProgress) -> SamplePlacement {
         let RestProgress { is_still, only_light_is_new, is_long, samples, starts_anew, .. } = *progress;
-        // one path a frame: places of frames are more even than those of the first few points of a
-        // sequence
+        // one path a frame: offsets of frames are more even than the first points of a sequence
         let spreads = inputs.settings.converges()
             && inputs.settings.antialias
             && samples > 1
@@ -185,8 +183,7 @@ fn align_paths(history: &History, inputs: &Inputs, progress: &RestProgress) -> P
     if progress.starts_anew {
         paths.in_block = taken == 0 && begins_pattern;
     }
-    // in motion the frames together take a sequence from its beginning; a pattern has the same
-    // paths in all its frames
+    // in motion frames take a sequence from its beginning; all of a pattern take the same paths
     if resting > 0 && begins_pattern && !paths.in_block {
         // a camera that has stood still from the first frame has the paths of a still
         let is_forgotten = samples.has_forgotten_short(resting) && taken <= samples.in_short();

@@ -27,13 +27,12 @@ impl AmbientVisibility {
     /// Compiles the pipeline for images of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Usage`] for more rays than a frame can have, [`Error::OutOfMemory`], and those of
-    /// compiling shaders.
+    /// [`Error::Usage`] for too many rays, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn pipeline(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Result<Pipeline> {
         let block = Block { origin: [0, 0], size };
         check_rays(block, settings)?;
         let (primary, primary_reason) = choose_primary(tracer, settings, size);
-        let frame_samples = FrameSamples::of_visibility(settings, pixels(size));
+        let frame_samples = FrameSamples::for_visibility(settings, pixels(size));
         Ok(Pipeline {
             signal: &Self,
             settings: Settings { primary: Some(primary), ..*settings },
@@ -109,7 +108,7 @@ fn stages(
     if has_rest {
         stages.push(rest::stage(tracer, pixels)?);
         if frame_samples.has_long() {
-            stages = stages.into_iter().map(Stage::of_short_frames).collect();
+            stages = stages.into_iter().map(Stage::in_short_frames).collect();
             stages.push(rest_samples::stage(block, frame_samples.most(), settings.launch_rays));
         }
         stages.extend(nlmeans::stages(tracer, block.size)?);
@@ -131,10 +130,7 @@ impl Signal for AmbientVisibility {
             spreads: false,
             // long frames have rays of their own, anywhere in the pixels
             keeps_offset: is_still && is_long,
-            first_sample: match is_long {
-                true => inputs.frame_samples.in_long_before(motion.frames_at_rest()),
-                false => 0,
-            },
+            first_sample: if is_long { inputs.frame_samples.in_long_before(motion.frames_at_rest()) } else { 0 },
             paths: history.paths,
         }
     }

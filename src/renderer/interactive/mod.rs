@@ -1,6 +1,8 @@
-//! A scene that is looked at: views of it whose camera, time and settings change at any moment, rendered in short steps that can be interrupted.
+//! A scene for viewers: views of it that change at any moment, rendered in short, interruptible
+//! steps.
 //!
-//! [`Interactive`] holds the scene's tracers, [`View`] an image of it in progress. Several views share tracers, pipelines and the pose of the scene.
+//! [`Interactive`] holds the scene's tracers, [`View`] an image of it in progress. Several views
+//! share tracers, pipelines and the pose of the scene.
 
 pub mod pick;
 pub(super) mod view;
@@ -49,7 +51,8 @@ struct PlayedAnimation<'r> {
     time: Option<f64>,
 }
 
-/// The scene as a tracer holds it. Integrators that interpret alpha blending differently need tracers of their own, and so does a white sky without materials.
+/// The scene as a tracer holds it. Integrators that interpret alpha blending differently need
+/// tracers of their own, and so does a white sky without materials.
 struct TracedScene<'r> {
     flat: FlatScene<'r>,
     tracer: Tracer,
@@ -58,17 +61,17 @@ struct TracedScene<'r> {
     number: u32,
     /// Number of poses so far.
     pose: u64,
-    /// What the last change of pose moved.
+    /// Bounds of all that the last change of pose moved.
     moved: Vec<MovedBounds>,
     /// The scene in its pose, if the animation moves lights or surfaces that emit light.
     posed: Option<Box<Scene>>,
 }
 
 impl Renderer {
-    /// Prepares views of the scene under these lights, with an animation of it (an index) to be played.
+    /// Prepares views of the scene under these lights, with an animation (an index) to be played.
     ///
     /// # Errors
-    /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that the scene does not have.
+    /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that does not exist.
     pub fn interactive(&mut self, lighting: &LightingSettings, animation: Option<usize>) -> Result<Interactive<'_>> {
         self.light_or_choose(lighting)?;
         // views build their own, and memory may not hold both
@@ -128,7 +131,8 @@ impl<'r> Interactive<'r> {
         std::mem::take(&mut self.warnings)
     }
 
-    /// Moves the scene to a time of its animation, in seconds since its start; after its end it holds its last pose. Returns true if anything moved.
+    /// Moves the scene to a time of its animation, in seconds since its start; after its end it
+    /// holds its last pose. Returns true if anything moved.
     ///
     /// # Errors
     /// Those of [`Tracer::update`].
@@ -139,8 +143,8 @@ impl<'r> Interactive<'r> {
         }
         animation.time = Some(seconds);
         animation.rig.pose(animation.index, seconds, Playback::Once, &mut animation.pose)?;
-        for world in &mut self.traced {
-            world.update(&animation.pose)?;
+        for traced in &mut self.traced {
+            traced.update(&animation.pose)?;
         }
         Ok(true)
     }
@@ -152,7 +156,7 @@ impl<'r> Interactive<'r> {
         Some(Camera { camera_to_world: *camera_to_world, ..self.scene.cameras.get(index)?.clone() })
     }
 
-    /// The camera to start with, for images of `aspect` = width / height: the file's first, or one that was chosen by what it would see ([`framing::choose`]).
+    /// The first camera, for images of `aspect` = width / height: the file's, or an automatic one.
     ///
     /// # Errors
     /// Those of the device; [`Error::Scene`] for a scene without geometry.
@@ -163,10 +167,7 @@ impl<'r> Interactive<'r> {
         }
     }
 
-    /// The camera that is chosen by what it would see, whatever cameras the file has ([`framing::choose`]).
-    ///
-    /// # Errors
-    /// As [`Self::choose_camera`].
+    /// As [`Self::choose_camera`], errors included, but whatever cameras the file has.
     pub fn automatic_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
@@ -174,7 +175,7 @@ impl<'r> Interactive<'r> {
         Ok(framing::choose(self.scene, aspect, None, &|rays| self.visible_surfaces(rays))?.camera())
     }
 
-    /// How open the surfaces are that a camera sees, by which an AO radius is chosen; `None` if it sees none.
+    /// Openness of the surfaces that a camera sees, for an AO radius; `None` if it sees none.
     ///
     /// # Errors
     /// Those of the device.
@@ -186,7 +187,8 @@ impl<'r> Interactive<'r> {
         radius::measure(camera, aspect, size, &|rays| self.visible_surfaces(rays))
     }
 
-    /// Finds or builds the tracer for an integrator, and returns its index. A tracer that lacks scene data is replaced by one that has all that was needed so far.
+    /// Finds or builds the tracer for an integrator, and returns its index. A tracer that lacks
+    /// scene data is replaced by one that has all that was needed so far.
     fn traced_scene(
         &mut self,
         blend: Blend,
@@ -203,8 +205,9 @@ impl<'r> Interactive<'r> {
             Some(k) => self.traced[k].needs.union(needs),
             None => needs,
         };
+
+        // The old tracer goes before a new one is built: both may not fit into memory.
         let flat = match found {
-            // the old tracer goes before the new one is built: both may not fit into memory
             Some(k) => self.traced.swap_remove(k).flat,
             None => {
                 let motion = match &self.animation {
@@ -219,17 +222,24 @@ impl<'r> Interactive<'r> {
         let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
         let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;
         self.built += 1;
+
+        // Put it into the pose that the scene is in.
         let moves_lights = match &self.animation {
             Some(a) => sequence::moves_lights(self.scene, a.rig, a.index)?,
             None => false,
         };
         let posed = moves_lights.then(|| Box::new(self.scene.clone()));
-        let mut world = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new(), posed };
+        let mut traced = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new(), posed };
         if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
-            world.update(&animation.pose)?;
+            traced.update(&animation.pose)?;
         }
-        self.traced.push(world);
+        self.traced.push(traced);
         Ok(self.traced.len() - 1)
+    }
+
+    /// The traced scene of this number, if it has not been replaced.
+    fn find_traced(&self, number: u32) -> Option<&TracedScene<'r>> {
+        self.traced.iter().find(|traced| traced.number == number)
     }
 }
 

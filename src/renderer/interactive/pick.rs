@@ -1,4 +1,4 @@
-//! What lies under a pixel.
+//! Picking: the surface under a pixel.
 
 use super::Interactive;
 use crate::error::Result;
@@ -30,7 +30,8 @@ pub struct Pick {
     pub textures: Vec<usize>,
 }
 
-/// The closest hits of rays (origins and unit directions in world space); `None` for misses. `origin` is that of the tracer's scene.
+/// The closest hits of rays (origins and unit directions in world space); `None` for misses.
+/// `origin` is that of the tracer's scene.
 ///
 /// # Errors
 /// Those of the device.
@@ -48,7 +49,8 @@ pub fn closest_hits(tracer: &Tracer, origin: DVec3, rays: &[(DVec3, DVec3)]) -> 
 }
 
 impl Interactive<'_> {
-    /// The point of the scene under a point of the image ([`camera_ray`]); `None` for background, and before the first view.
+    /// The point of the scene under a point of the image ([`camera_ray`]); `None` for background,
+    /// and before the first view.
     ///
     /// # Errors
     /// Those of the device.
@@ -60,18 +62,18 @@ impl Interactive<'_> {
         Ok(hit.map(|hit| self.describe(near + f64::from(hit.t), ray.0 + ray.1 * f64::from(hit.t), &hit)))
     }
 
-    /// The closest hits of rays (origins and unit directions in world space); `None` for misses, and for all before the first view.
+    /// The closest hits of rays as of [`closest_hits`]; all miss before the first view.
     ///
     /// # Errors
     /// Those of the device.
     pub(super) fn closest_hits(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<Hit>>> {
         match self.traced.first() {
-            Some(world) => closest_hits(&world.tracer, world.flat.origin, rays),
+            Some(traced) => closest_hits(&traced.tracer, traced.flat.origin, rays),
             None => Ok(vec![None; rays.len()]),
         }
     }
 
-    /// What rays (origins and unit directions in world space) see; nothing before the first view.
+    /// The surfaces that rays hit (origins and unit directions in world space), none before a view.
     ///
     /// # Errors
     /// Those of the device.

@@ -9,27 +9,30 @@ use glam::DVec3;
 use super::{Interactive, TracedScene};
 use crate::accel::features::Blend;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::film::state::FilmState;
 use crate::film::tile_mask::TileMask;
 use crate::film::{Control, Film, SampleSettings};
 use crate::gpu::Timing;
-use crate::integrators::aov::Aov;
+use crate::integrators::aov::{self, Aov};
 use crate::integrators::{Integrator, RenderJob};
-use crate::output::{self, Channel, FileSettings, Image, Picture, Samples, png};
+use crate::output::{self, Channel, FileSettings, Image, Picture, png};
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
-use crate::renderer::RenderSettings;
 use crate::renderer::frames::{
     colour_channels, frame_display, frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion,
     pipeline, settling_frames,
 };
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::shell::quoted;
+use crate::renderer::still::camera_text;
+use crate::renderer::{RenderSettings, camera_numbers};
 use crate::scene::{Camera, ClipPlanes, Projection};
+use crate::tracer::MovedBounds;
 
-/// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second on two cores.
+/// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second.
 const CPU_LAUNCH_RAYS: u32 = 1 << 17;
 /// Samples per pixel at which a still counts as finished.
 const MAX_SPP: u32 = 1 << 20;
@@ -39,8 +42,8 @@ pub struct View {
     settings: RenderSettings,
     size: [u32; 2],
     camera: Option<Camera>,
-    /// Number of the tracer's world, by which it is found again, and of the pose that the image shows.
-    world: u32,
+    /// Number of the traced scene, to find it again, and of the pose that the image shows.
+    scene_number: u32,
     pose: u64,
     kind: Kind,
 }
@@ -70,7 +73,7 @@ struct StillView {
     film: Film,
 }
 
-/// What a step of a view did.
+/// Statistics of a step of a view.
 #[derive(Clone, Debug, Default)]
 pub struct ViewStep {
     /// Device seconds of passes, in order.
@@ -121,10 +124,10 @@ pub struct ViewValues {
 }
 
 impl View {
-    /// Creates a view: frames in real time if the settings select them, else a still. The size is in pixels, whatever the settings say.
+    /// Creates a view of `size` pixels: frames if the settings select them, else a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together; those of the device and of `control`.
+    /// [`Error::Usage`] for settings without effect together; those of the device and of `control`.
     pub fn new(
         session: &mut Interactive,
         settings: &RenderSettings,
@@ -134,44 +137,47 @@ impl View {
         settings.check()?;
         output::check_size(size[0], size[1])?;
         let is_frames = settings.realtime_setting().is_some();
-        let (world, kind) =
-            if is_frames { Self::frames(session, settings, size, control)? } else { Self::still(session, settings, control)? };
-        Ok(Self { settings: settings.clone(), size, camera: None, world, pose: 0, kind })
+        let (scene_number, kind) = if is_frames {
+            Self::new_frames(session, settings, size, control)?
+        } else {
+            Self::new_still(session, settings, control)?
+        };
+        Ok(Self { settings: settings.clone(), size, camera: None, scene_number, pose: 0, kind })
     }
 
-    fn frames(
+    fn new_frames(
         session: &mut Interactive,
         settings: &RenderSettings,
         size: [u32; 2],
         control: &mut dyn Control,
     ) -> Result<(u32, Kind)> {
-        let mut how = frame_settings(settings)?;
+        let mut realtime_settings = frame_settings(settings)?;
         if session.device.info.is_cpu() {
-            how.launch_rays = CPU_LAUNCH_RAYS;
+            realtime_settings.launch_rays = CPU_LAUNCH_RAYS;
         }
         let integrator = settings.integrator();
         let blend = if is_ambient_occlusion(integrator) { Blend::Masked } else { integrator.get().blend() };
-        let streams = frame_streams(settings, &how);
-        let world = session.traced_scene(blend, frame_needs(settings, &how), streams, control)?;
-        let world = &session.traced[world];
+        let streams = frame_streams(settings, &realtime_settings);
+        let index = session.traced_scene(blend, frame_needs(settings, &realtime_settings), streams, control)?;
+        let traced = &session.traced[index];
         // which one makes no difference: lenses are for stills
         let any_camera = Camera::framing(DVec3::NEG_ONE, DVec3::ONE, 1.0);
-        let options = frame_path_options(settings, session.scene, &any_camera, size, &how)?;
-        let mut realtime = pipeline(&world.tracer, &world.flat, size, &how, options.as_ref())?;
+        let options = frame_path_options(settings, session.scene, &any_camera, size, &realtime_settings)?;
+        let mut realtime = pipeline(&traced.tracer, &traced.flat, size, &realtime_settings, options.as_ref())?;
         let display = frame_display(settings, session.scene);
         let shown = display.shown;
-        realtime.display(&world.tracer, Some(display))?;
+        realtime.display(&traced.tracer, Some(display))?;
         let settling = settling_frames(&realtime);
         let view = FramesView { realtime, shown, resting: 0, settling, was_interrupted: false };
-        Ok((world.number, Kind::Frames(Box::new(view))))
+        Ok((traced.number, Kind::Frames(Box::new(view))))
     }
 
-    fn still(session: &mut Interactive, settings: &RenderSettings, control: &mut dyn Control) -> Result<(u32, Kind)> {
+    fn new_still(session: &mut Interactive, settings: &RenderSettings, control: &mut dyn Control) -> Result<(u32, Kind)> {
         let integrator = settings.integrator().get();
-        let how = &settings.integrators;
-        let world = session.traced_scene(integrator.blend(), integrator.needs(how), integrator.streams(how), control)?;
+        let (needs, streams) = (integrator.needs(&settings.integrators), integrator.streams(&settings.integrators));
+        let index = session.traced_scene(integrator.blend(), needs, streams, control)?;
         let view = StillView { integrator, tile_mask: None, state: None, film: Film::default() };
-        Ok((session.traced[world].number, Kind::Still(Box::new(view))))
+        Ok((session.traced[index].number, Kind::Still(Box::new(view))))
     }
 
     /// Width and height in pixels.
@@ -179,7 +185,12 @@ impl View {
         self.size
     }
 
-    /// Samples per pixel so far: the minimum of a still, or of frames in real time those at rest, or of the longest history.
+    /// Width over height.
+    fn aspect(&self) -> f64 {
+        f64::from(self.size[0]) / f64::from(self.size[1])
+    }
+
+    /// Samples per pixel so far: a still's minimum; of frames those at rest, or of a history.
     pub fn samples(&self) -> u32 {
         match &self.kind {
             Kind::Frames(view) => view.realtime.shown_samples(),
@@ -192,25 +203,26 @@ impl View {
         &self.settings
     }
 
-    /// Returns true for frames in real time, which keep what they know while the camera moves; a still starts anew.
+    /// Returns true for frames, which keep their histories in motion; a still starts anew.
     pub fn is_realtime(&self) -> bool {
         matches!(self.kind, Kind::Frames(_))
     }
 
     /// Returns true if the session has replaced its tracer: it must be created anew.
     pub fn is_stale(&self, session: &Interactive) -> bool {
-        !session.traced.iter().any(|w| w.number == self.world)
+        session.find_traced(self.scene_number).is_none()
     }
 
-    /// Has a view of frames continue those of another one of the same settings, and mostly of another size; with `keeps_own` only if it has not seen most of what that shows
+    /// Has a view of frames continue those of another one of the same settings, and mostly of
+    /// another size; with `keeps_own` only if it has not seen most of what that shows
     /// ([`Realtime::continue_from`]). Stills are left as they are.
     ///
     /// # Errors
     /// Those of the device.
     pub fn continue_from(&mut self, session: &Interactive, other: &Self, keeps_own: bool) -> Result<()> {
-        let world = session.traced.iter().find(|w| w.number == self.world && w.number == other.world);
-        if let (Some(world), Kind::Frames(ours), Kind::Frames(theirs)) = (world, &mut self.kind, &other.kind)
-            && ours.realtime.continue_from(&world.tracer, &theirs.realtime, keeps_own)?
+        let traced = session.find_traced(self.scene_number).filter(|traced| traced.number == other.scene_number);
+        if let (Some(traced), Kind::Frames(ours), Kind::Frames(theirs)) = (traced, &mut self.kind, &other.kind)
+            && ours.realtime.continue_from(&traced.tracer, &theirs.realtime, keeps_own)?
         {
             (self.camera, self.pose) = (other.camera.clone(), other.pose);
             ours.was_interrupted = true;
@@ -229,8 +241,9 @@ impl View {
         }
     }
 
-    /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each pixel. `control` may interrupt it, after which a
-    /// still starts anew; frames have their histories ([`Realtime::frame_with`]).
+    /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each
+    /// pixel. After an interruption a still starts anew, a frame does not
+    /// ([`Realtime::frame_with`]).
     ///
     /// # Errors
     /// Those of the device and of `control`, usually [`Error::Interrupted`].
@@ -242,18 +255,17 @@ impl View {
         control: &mut dyn Control,
     ) -> Result<ViewStep> {
         let gone = || Error::Usage("the view's scene is no longer loaded".into());
-        let world = session.traced.iter().find(|w| w.number == self.world).ok_or_else(gone)?;
-        let has_moved = self.pose != world.pose;
+        let traced = session.find_traced(self.scene_number).ok_or_else(gone)?;
+        let has_moved = self.pose != traced.pose;
         let rests = self.camera.as_ref() == Some(camera) && !has_moved;
         self.camera = Some(camera.clone());
-        self.pose = world.pose;
+        self.pose = traced.pose;
         match &mut self.kind {
             Kind::Frames(view) => {
-                let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
-                let record = CameraRecord::new(camera, world.flat.origin, aspect);
-                let moved = if has_moved { &world.moved[..] } else { &[] };
+                let record = CameraRecord::new(camera, traced.flat.origin, self.aspect());
+                let moved = if has_moved { &traced.moved[..] } else { &[] };
                 view.resting = if rests && !view.was_interrupted { view.resting.saturating_add(1) } else { 0 };
-                let step = view.step(world, &record, moved, control);
+                let step = view.step(traced, &record, moved, control);
                 view.was_interrupted = step.is_err();
                 step
             }
@@ -269,7 +281,7 @@ impl View {
                     film: FilmOptions { start: view.state.clone(), keep_state: true, ..Default::default() },
                     ..job.samples
                 };
-                view.step(world, job, control)
+                view.step(traced, job, control)
             }
         }
     }
@@ -325,13 +337,13 @@ impl View {
             Kind::Still(view) => {
                 let film = &view.film;
                 let channels = film.channels.max(1);
-                let of = |(k, v): (usize, &f32)| v / film.samples[k / channels].max(1) as f32;
+                let of_mean = |(k, v): (usize, &f32)| v / film.samples[k / channels].max(1) as f32;
                 ViewValues {
                     size,
                     channels,
                     values: film.mean.clone(),
                     coverage: film.coverage.iter().map(|c| if *c > 0.0 { 1.0 } else { 0.0 }).collect(),
-                    variance: Some(film.variance.iter().enumerate().map(of).collect()),
+                    variance: Some(film.variance.iter().enumerate().map(of_mean).collect()),
                 }
             }
         })
@@ -342,35 +354,29 @@ impl View {
     /// # Errors
     /// Those of the device and of `control`.
     pub fn image(&self, session: &Interactive, control: &mut dyn Control) -> Result<Image> {
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
         let mut image = match &self.kind {
             Kind::Frames(view) => {
                 let realtime = &view.realtime;
                 let mut channels = colour_channels(realtime)?;
-                channels.extend([f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)]);
+                channels.push(Channel::from_floats("A", realtime.coverage()?));
+                channels.push(Channel::from_floats("samples", realtime.samples()?));
                 Image { width: self.size[0], height: self.size[1], channels, metadata: Vec::new() }
             }
             Kind::Still(view) => view.image(self.size),
         };
-        let world = session.traced.iter().find(|w| w.number == self.world);
-        if let (Some(world), Some(camera)) = (world, &self.camera) {
-            let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
-            let record = CameraRecord::new(camera, world.flat.origin, aspect);
+        if let (Some(traced), Some(camera)) = (session.find_traced(self.scene_number), &self.camera) {
+            let (aspect, origin) = (self.aspect(), traced.flat.origin);
+            let record = CameraRecord::new(camera, origin, aspect);
             let wanted = [Aov::Depth, Aov::Position, Aov::Ng, Aov::Ids];
-            let pixels = crate::integrators::aov::render(&world.tracer, &record, self.size, control)?;
-            image.channels.extend(crate::integrators::aov::channels(&wanted, &pixels, world.flat.origin));
-            let flags = render_flags(
-                &crate::files::portable_name(session.name),
-                &self.settings,
-                &session.scene.cameras,
-                camera,
-                self.size,
-            );
-            image.metadata = crate::renderer::camera_numbers::metadata(camera, aspect).map(|(k, v)| (k.to_owned(), v)).to_vec();
+            let pixels = aov::render(&traced.tracer, &record, self.size, control)?;
+            image.channels.extend(aov::channels(&wanted, &pixels, origin));
+            let name = files::portable_name(session.name);
+            let flags = render_flags(&name, &self.settings, &session.scene.cameras, camera, self.size);
+            image.metadata = camera_numbers::metadata(camera, aspect).map(|(k, v)| (k.to_owned(), v)).to_vec();
             image.metadata.extend([
-                ("camera".into(), crate::renderer::still::camera_text(camera)),
+                ("camera".into(), camera_text(camera)),
                 ("command".into(), flags),
-                ("scene".into(), crate::files::portable_name(session.name)),
+                ("scene".into(), name),
                 ("version".into(), env!("CARGO_PKG_VERSION").into()),
             ]);
         }
@@ -381,16 +387,16 @@ impl View {
 impl FramesView {
     fn step(
         &mut self,
-        world: &TracedScene,
+        traced: &TracedScene,
         camera: &CameraRecord,
-        moved: &[crate::tracer::MovedBounds],
+        moved: &[MovedBounds],
         control: &mut dyn Control,
     ) -> Result<ViewStep> {
-        if let Some(posed) = &world.posed {
-            self.realtime.move_lights(&world.tracer, posed)?;
+        if let Some(posed) = &traced.posed {
+            self.realtime.move_lights(&traced.tracer, posed)?;
         }
         let FrameStats { timings, primary_rays, occlusion_rays, nodes, .. } =
-            self.realtime.frame_with(&world.tracer, camera, moved, Some(control))?;
+            self.realtime.frame_with(&traced.tracer, camera, moved, Some(control))?;
         Ok(ViewStep {
             timings,
             rays: [primary_rays, occlusion_rays],
@@ -406,11 +412,11 @@ impl StillView {
         (self.state, self.tile_mask) = (None, None);
     }
 
-    fn step(&mut self, world: &TracedScene, mut job: RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
-        let record = job.camera_record(&world.flat);
-        let make = || job.tile_mask(self.integrator, &world.flat, &record);
+    fn step(&mut self, traced: &TracedScene, mut job: RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
+        let record = job.camera_record(&traced.flat);
+        let make = || job.tile_mask(self.integrator, &traced.flat, &record);
         job.samples.tile_mask = self.tile_mask.get_or_insert_with(make).clone();
-        let rendered = match self.integrator.render(&world.tracer, &world.posed(), &job, control) {
+        let rendered = match self.integrator.render(&traced.tracer, &traced.posed(), &job, control) {
             Ok(rendered) => rendered.image,
             Err(e) => {
                 self.restart();
@@ -429,9 +435,9 @@ impl StillView {
 
     fn image(&self, size: [u32; 2]) -> Image {
         let names = self.integrator.channels();
-        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
-        let mut channels: Vec<_> = names.iter().enumerate().map(|(c, name)| f32s(name, self.film.plane(c))).collect();
-        channels.push(f32s("A", self.film.coverage.clone()));
+        let plane = |(c, name): (usize, &&str)| Channel::from_floats(*name, self.film.plane(c));
+        let mut channels: Vec<_> = names.iter().enumerate().map(plane).collect();
+        channels.push(Channel::from_floats("A", self.film.coverage.clone()));
         Image { width: size[0], height: size[1], channels, metadata: Vec::new() }
     }
 }
@@ -444,15 +450,15 @@ pub fn render_flags(name: &str, settings: &RenderSettings, cameras: &[Camera], c
     render_command(name, &settings)
 }
 
-/// The command that renders a scene with these settings: `skylit render SCENE ...`, quoted for a shell.
+/// The command that renders a scene with these settings: `skylit render ...`, quoted for a shell.
 pub fn render_command(name: &str, settings: &RenderSettings) -> String {
     let output = format!("{}.png", settings.integrator().name());
     let words = ["skylit".into(), "render".into(), name.to_owned(), "-o".into(), output];
     words.into_iter().chain(settings.flags()).map(|w| quoted(&w)).collect::<Vec<_>>().join(" ")
 }
 
-/// The settings that choose this camera: the name of one of the file's, or position, target, up vector and field of view. The place of an orthographic camera that is
-/// not one of the file's cannot be said.
+/// The settings that choose this camera: the name of one of the file's, or position, target, up
+/// vector and field of view. No settings give the position of another orthographic camera.
 pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
     if let Some(index) = cameras.iter().position(|c| c == camera) {
         return CameraSettings { camera: Some(index.to_string()), ..Default::default() };

@@ -1,4 +1,4 @@
-//! The camera of a scene that has none: chosen by what cameras inside and outside would see, or named.
+//! The camera of a scene that has none: chosen by what cameras would see, or named.
 
 use std::f64::consts::TAU;
 
@@ -50,11 +50,11 @@ impl ViewName {
 
 /// Directions, close to the horizontal, in which it is tested whether there are walls.
 const PROBES: usize = 96;
-/// Share of them that must see the front of something for a place to be inside a room: from inside an object they see backs.
+/// Share of them that must see a front for a position to be in a room: objects show backs inside.
 const ENCLOSED: f64 = 0.93;
-/// Nine in ten of them see nothing nearer than this share of the scene's diagonal: rooms are empty in the middle, vehicles are not.
+/// Distance, over the scene's diagonal, that nine in ten exceed: rooms are empty, vehicles are not.
 const CLEARANCE: f64 = 0.04;
-/// Places inside a room that are compared, along each axis of its floor, and their heights as shares of the scene's.
+/// Positions inside a room that are compared, along each axis of its floor, and their heights.
 const PLACES: usize = 5;
 const HEIGHTS: [f64; 2] = [0.2, 0.35];
 /// Directions that are compared at each place.
@@ -68,8 +68,8 @@ const ENOUGH_DETAIL: f64 = 0.25;
 /// Vertical field of view inside, and outside, radians.
 const INSIDE_FOV_Y: f64 = 1.05;
 const OUTSIDE_FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
-/// Cameras outside that are compared: degrees from the front to the right and upwards, and how much they are preferred. The first is what most models are made for;
-/// another must show clearly more.
+/// Cameras outside that are compared: degrees from the front to the right and upwards, and how much
+/// they are preferred. The first is what most models are made for; another must show clearly more.
 const OUTSIDE: [([f64; 2], f64); 12] = [
     ([19.0, 16.0], 1.15),
     ([-19.0, 16.0], 1.05),
@@ -90,7 +90,7 @@ const INSIDE_WORDS: &str = "from inside";
 /// Above this number of points, the corners of each instance's box stand for its vertices.
 const MAX_POINTS: u64 = 8_000_000;
 
-/// A camera that was chosen, as options of the command line give it: numbers short enough to be typed, and the camera that follows from them.
+/// A chosen camera, and its options of the command line, with numbers short enough to be typed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChosenCamera {
     /// From where it looks, in words: `from outside`.
@@ -106,13 +106,13 @@ pub struct ChosenCamera {
 }
 
 impl ChosenCamera {
-    /// A perspective camera with its position and direction to a ten-thousandth of the scene's diagonal: about a tenth of a pixel. `up` is what it was made with, `fov_y` (radians) what it
-    /// was asked for.
+    /// A perspective camera with its position and direction to a ten-thousandth of the scene's
+    /// diagonal: about a tenth of a pixel. It was made with `up`; `fov_y` (radians) was asked for.
     fn rounded(camera: &Camera, up: DVec3, fov_y: Option<f64>, bounds: (DVec3, DVec3), words: impl Into<String>) -> Self {
         let (lo, hi) = bounds;
         let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
         let diagonal = (hi - lo).length();
-        // the middle of the scene where that is ahead, and far enough for the direction to survive the rounding
+        // a point near the scene's middle, far enough ahead to survive the rounding
         let distance = ((lo + hi) * 0.5 - eye).dot(forward).max(0.5 * diagonal);
         let distance = if distance > 0.0 { distance } else { 1.0 };
         let angle = match camera.projection {
@@ -161,9 +161,13 @@ pub(in crate::renderer) fn rounded(point: DVec3, size: f64) -> DVec3 {
     DVec3::from_array(point.to_array().map(round))
 }
 
-/// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in radians, if one is given. Inside means: from the middle of the scene there is something in
-/// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view that shows more than bare walls; else the camera sees
-/// the whole scene, from the side that shows most fronts and most directions of surfaces. A hollow body that shows its fronts to the outside, as a bottle does, is seen from there.
+/// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in
+/// radians, if one is given.
+///
+/// It is inside if from the middle of the scene nearly all horizontal directions show fronts, none
+/// of them close: at the position and direction with the longest view that shows more than bare
+/// walls. Else the camera sees the whole scene, from the side that shows most fronts and most
+/// directions of surfaces, and so do hollow bodies with fronts outside, like bottles.
 ///
 /// # Errors
 /// Those of `trace`; [`Error::Scene`] for a scene without geometry.
@@ -206,7 +210,7 @@ pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -
 ///
 /// # Errors
 /// [`Error::Scene`] for a scene without geometry.
-pub fn of_scene(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
+pub fn choose_on_host(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
     if survey.is_small() {
         return choose(survey.scene, aspect, fov_y, &|rays| survey.trace(rays));
     }
@@ -230,7 +234,7 @@ fn enclosing(scene: &Scene, from: DVec3, up: DVec3, aspect: f64, fov_y: Option<f
     Camera::enclosing(&hull(scene), from, up, fov_y.unwrap_or(OUTSIDE_FOV_Y), aspect).ok_or_else(no_geometry)
 }
 
-/// What a camera has to hold: vertices and spheres in world space.
+/// Spheres that a camera has to hold: vertices and spheres in world space.
 fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
     let count = |i: &crate::scene::Instance| match &scene.meshes[i.mesh].geometry {
         Geometry::Triangles(t) => t.positions.len() as u64,
@@ -240,23 +244,20 @@ fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
     scene
         .instances
         .par_iter()
-        .flat_map_iter(|instance| {
+        .flat_map_iter(|instance| -> Vec<(DVec3, f64)> {
             let to_world = &instance.object_to_world;
             let place = |p: DVec3| to_world.transform_point3(p);
             let geometry = &scene.meshes[instance.mesh].geometry;
-            let points: Vec<(DVec3, f64)> = match exact {
-                true => {
-                    let m = &to_world.matrix3;
-                    let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-                    let point = |p: glam::Vec4| (place(p.truncate().as_dvec3()), scale * f64::from(p.w));
-                    geometry.points().into_iter().map(point).collect()
-                }
-                false => geometry.bounds().map_or_else(Vec::new, |(lo, hi)| {
-                    let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { lo[a] } else { hi[a] }));
-                    (0..8).map(|k| (place(corner(k)), 0.0)).collect()
-                }),
-            };
-            points
+            if exact {
+                let m = &to_world.matrix3;
+                let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+                let point = |p: glam::Vec4| (place(p.truncate().as_dvec3()), scale * f64::from(p.w));
+                return geometry.points().into_iter().map(point).collect();
+            }
+            geometry.bounds().map_or_else(Vec::new, |(lo, hi)| {
+                let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { lo[a] } else { hi[a] }));
+                (0..8).map(|k| (place(corner(k)), 0.0)).collect()
+            })
         })
         .collect()
 }
@@ -278,7 +279,7 @@ fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
     Ok(true)
 }
 
-/// Whether the scene is one thing with walls that have a thickness: a mesh without open edges, in one place. Rooms are made of several, or their walls are sheets that face inwards.
+/// Whether the scene is one closed mesh. Rooms are made of several, or of sheets that face inwards.
 fn is_body(scene: &Scene) -> bool {
     let [instance] = &scene.instances[..] else { return false };
     match &scene.meshes[instance.mesh].geometry {
@@ -294,14 +295,14 @@ fn view_rays(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
     (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
 }
 
-/// What the rays of views see.
-fn seen(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
+/// The surfaces that the rays of views hit.
+fn trace_views(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
     let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(|c| view_rays(c, aspect)).collect();
     Ok(trace(&rays)?.chunks_exact(VIEW[0] * VIEW[1]).map(<[_]>::to_vec).collect())
 }
 
-/// Share of the rays of a view that see a plane of their own, from 0 to 1: a corridor has few planes, a furnished room many. Planes count as one whose normals and whose places, in fiftieths of
-/// `size`, are nearly the same.
+/// Number of planes that a view sees over its rays: a corridor has few, a furnished room many.
+/// Planes count as one whose normals and positions, in fiftieths of `size`, are nearly the same.
 fn detail(rays: &[(DVec3, DVec3)], seen: &[Option<VisibleSurface>], size: f64) -> f64 {
     let plane = |((from, along), s): (&(DVec3, DVec3), &Option<VisibleSurface>)| {
         s.as_ref().map(|s| {
@@ -314,7 +315,7 @@ fn detail(rays: &[(DVec3, DVec3)], seen: &[Option<VisibleSurface>], size: f64) -
 }
 
 /// The camera with the highest score, and the score; of equal ones the first.
-fn best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Camera, f64)> {
+fn choose_best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Camera, f64)> {
     let best = scores.enumerate().reduce(|a, b| if b.1 > a.1 { b } else { a });
     best.and_then(|(k, score)| Some((cameras.into_iter().nth(k)?, score))).ok_or_else(no_geometry)
 }
@@ -349,8 +350,8 @@ fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Tra
         let sum = (1.0 - flaws) * shown * sum;
         if nearest < 0.02 { 0.2 * sum } else { sum }
     };
-    let scores: Vec<f64> = cameras.iter().zip(seen(&cameras, aspect, trace)?).map(score).collect();
-    best(cameras, scores.into_iter())
+    let scores: Vec<f64> = cameras.iter().zip(trace_views(&cameras, aspect, trace)?).map(score).collect();
+    choose_best(cameras, scores.into_iter())
 }
 
 /// The camera outside that shows most.
@@ -363,13 +364,14 @@ fn outside(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Res
         let fronts = seen.iter().flatten().filter(|s| s.is_front).count() as f64;
         let backs = seen.iter().flatten().filter(|s| !s.is_front).count() as f64;
         let mean = seen.iter().flatten().map(|s| s.normal).sum::<DVec3>() / (fronts + backs).max(1.0);
-        // A wall seen head on has one normal, whose length is 1; three sides of a box have a mean of 0.58, a sphere of 0.67
+        // a wall seen head on has one normal, of length 1; three sides of a box have a mean of 0.58
         let variety = 1.0 - mean.length();
         preference * (fronts - backs) / (fronts + backs).max(1.0) * (0.5 + variety)
     };
     let preferences = OUTSIDE.iter().map(|o| o.1);
-    let scores = seen(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
-    best(cameras, scores)
+    let scores =
+        trace_views(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
+    choose_best(cameras, scores)
 }
 
 /// Distances of what is seen from its front around a point, ascending.
@@ -467,7 +469,7 @@ mod tests {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
             let (lo, hi) = scene.bounds().unwrap();
-            let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera().camera_to_world.translation;
+            let eye = choose_on_host(&Survey::new(&scene), 1.5, None).unwrap().camera().camera_to_world.translation;
             assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
         }
     }
@@ -486,7 +488,7 @@ mod tests {
         mesh.normals.clear();
         mesh.texcoords.iter_mut().for_each(|t| t.clear());
         let (lo, hi) = scene.bounds().unwrap();
-        let eye = |scene: &Scene| of_scene(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
+        let eye = |scene: &Scene| choose_on_host(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
         let is_inside = |p: DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
         assert!(!is_inside(eye(&scene)));
         // as two meshes it is a room with thick walls
@@ -528,7 +530,7 @@ mod tests {
             if flip {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            let camera = of_scene(&Survey::new(&scene), 1.0, None).unwrap().camera();
+            let camera = choose_on_host(&Survey::new(&scene), 1.0, None).unwrap().camera();
             assert_eq!(camera.camera_to_world.translation.x < 0.0, left, "{camera:?}");
         }
     }

@@ -11,18 +11,15 @@ use crate::scene::{Camera, Material, light_spec};
 
 /// Radiance of the sky: neutral, so that colours are those of the surfaces.
 const SKY: &str = "0.5,0.5,0.5";
-/// The sun: from above, the left and before a scene that is seen from its front. Its disk is ten times as wide as the real one, for soft shadows. Together with
-/// the sky a white floor reflects a radiance of 0.9, just below white.
+/// The sun: from above, the left and before a scene seen from its front, ten times as wide as the
+/// real one, for soft shadows. Together with the sky a white floor reflects a radiance of 0.9.
 const SUN: &str = "sun direction=0.45,-1,-0.7 irradiance=1.65 angle=5";
-/// Median irradiance of what is in view in a closed room, bounces included, over pi: the radiance of white diffuse surfaces.
+/// Median irradiance in view of a closed room over pi: the radiance of white diffuse surfaces.
 const LAMP: f64 = 0.5;
 /// Rays through the image, along its width and height, that find what is in view.
 const VIEW: [usize; 2] = [24, 16];
 
-/// Light for a scene that has none, and what it is in words: a sky and a sun, or a lamp where the camera is in a closed room.
-///
-/// # Errors
-/// None.
+/// Lights a scene without light, and names the light: sky and sun, or a lamp in a closed room.
 pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(LightingSettings, String)> {
     let eye = camera.camera_to_world.translation;
     let parse = |text: &str| light_spec::parse(text).map_err(Error::Usage);
@@ -37,7 +34,7 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
     let mut seen = survey.trace(&views)?;
     clip(camera, &views, &mut seen);
-    // Of each surface: irradiance by a lamp of one candela, without shadows (next to the camera it has few that are seen), and about how much it reflects.
+    // irradiance of each surface by a lamp of one candela, without shadows, and its reflectance
     let mut lit: Vec<(f64, f64)> = views
         .iter()
         .zip(seen)
@@ -59,7 +56,7 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     Ok((LightingSettings { light: vec![parse(&text)?], ..Default::default() }, "a lamp above the camera".into()))
 }
 
-/// About how much light a material reflects, at most 0.9. Nobody looks into its texture: half of its colour.
+/// About how much light a material reflects, at most 0.9; half of its colour if it has a texture.
 fn reflectance(material: &Material) -> f64 {
     let colour = material.base_color.truncate().dot(glam::Vec3::new(0.2126, 0.7152, 0.0722));
     let texture = if material.base_color_texture.is_some() { 0.5 } else { 1.0 };

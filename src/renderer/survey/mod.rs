@@ -1,4 +1,4 @@
-//! What a scene looks like before it is rendered: a few thousand rays choose the camera, the AO radius and the light that settings leave open.
+//! A survey of a scene: a few thousand rays choose the camera, the AO radius and the light.
 
 pub mod framing;
 pub mod light;
@@ -15,7 +15,7 @@ use crate::oracle::{Oracle, OracleRay};
 use crate::scene::{Geometry, Scene};
 use rays::visible_surfaces;
 
-/// What a ray sees.
+/// The surface that a ray hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisibleSurface {
     /// Distance, scene units.
@@ -31,7 +31,7 @@ pub struct VisibleSurface {
 /// Finds what rays see, which are given as origins and unit directions.
 pub type Trace<'a> = dyn Fn(&[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> + 'a;
 
-/// Scenes with more triangles and spheres than this are not looked at by the host: its hierarchy of them would take too long.
+/// Scenes with more primitives are not surveyed on the host: a hierarchy would take too long.
 const MAX_PRIMITIVES: u64 = 5_000_000;
 
 /// A scene to be looked at by rays that are traced on the host, in double precision.
@@ -71,10 +71,7 @@ impl<'s> Survey<'s> {
         self.scene.triangle_count() + self.scene.sphere_count() <= MAX_PRIMITIVES
     }
 
-    /// What rays see.
-    ///
-    /// # Errors
-    /// None.
+    /// Finds the surfaces that rays hit, without any error.
     pub fn trace(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
         let origin = self.scene.origin();
         let oracle = self.oracle.get_or_init(|| Oracle::new(self.scene, origin));
@@ -86,8 +83,8 @@ impl<'s> Survey<'s> {
         Ok(visible_surfaces(self.scene, rays, rays.par_iter().map(closest).collect()))
     }
 
-    /// Distance, scene units, and whether it is a front, of the nearest surface in each direction from a point: by all triangles, without a hierarchy.
-    /// Infinite where there is none. Spheres and cutouts are not looked at.
+    /// Distance in scene units, infinite for none, of the nearest surface in each direction from a
+    /// point, and whether it is a front: by all triangles, without a hierarchy or spheres.
     pub fn nearest<const N: usize>(&self, eye: DVec3, directions: [DVec3; N]) -> [(f64, bool); N] {
         let scene = self.scene;
         let nearest = scene.instances.par_iter().map(|instance| {
@@ -119,9 +116,9 @@ impl<'s> Survey<'s> {
         nearest.reduce(none, |a, b| std::array::from_fn(|k| if b[k].0 < a[k].0 { b[k] } else { a[k] }))
     }
 
-    /// Distances of the nearest surfaces around a point, if there is one in every direction tried: then the point is in a closed room, or in a solid body.
-    pub fn walls(&self, eye: DVec3) -> Option<[f64; AROUND]> {
-        let distances = self.nearest(eye, around()).map(|(distance, _)| distance);
+    /// Distances of the nearest surfaces around a point of a closed room or solid body, or `None`.
+    pub fn walls(&self, eye: DVec3) -> Option<[f64; WALL_DIRECTIONS]> {
+        let distances = self.nearest(eye, sphere_directions()).map(|(distance, _)| distance);
         distances.iter().all(|d| d.is_finite()).then_some(distances)
     }
 }
@@ -132,12 +129,12 @@ pub fn significant(value: f64, digits: usize) -> f64 {
 }
 
 /// Number of directions of [`Survey::walls`].
-pub const AROUND: usize = 16;
+pub const WALL_DIRECTIONS: usize = 16;
 
 /// Directions that cover the sphere evenly (a Fibonacci lattice); the first is upwards.
-fn around() -> [DVec3; AROUND] {
+fn sphere_directions() -> [DVec3; WALL_DIRECTIONS] {
     std::array::from_fn(|k| {
-        let y = 1.0 - 2.0 * k as f64 / (AROUND - 1) as f64;
+        let y = 1.0 - 2.0 * k as f64 / (WALL_DIRECTIONS - 1) as f64;
         let (sin, cos) = (2.399_963_229_728_653 * k as f64).sin_cos();
         let radius = (1.0 - y * y).max(0.0).sqrt();
         // no direction lies within a wall of a scene that is made of boxes, or on its edges
@@ -160,11 +157,11 @@ mod tests {
             assert_eq!(walls.is_some(), closed, "{name}");
             assert!(walls.into_iter().flatten().all(|d| d > 0.0 && d < survey.diagonal()));
             // as the hierarchy finds them
-            let rays = around().map(|d| (middle, d));
+            let rays = sphere_directions().map(|d| (middle, d));
             let traced = survey.trace(&rays).unwrap();
             let distance = |v: &Option<VisibleSurface>| v.map_or(f64::INFINITY, |v| v.distance);
             if scene.sphere_count() == 0 {
-                for (a, b) in survey.nearest(middle, around()).iter().zip(&traced) {
+                for (a, b) in survey.nearest(middle, sphere_directions()).iter().zip(&traced) {
                     let b = distance(b);
                     assert!(a.0 == b || (a.0 / b - 1.0).abs() < 1e-5, "{name}: {} {b}", a.0);
                 }

@@ -15,7 +15,7 @@ const VIEW: [usize; 2] = [24, 16];
 const RAYS: usize = 12;
 /// Mean ambient visibility of the surfaces in view at the radius that is chosen.
 pub const TARGET: f64 = 0.6;
-/// Where a smaller share of occlusion rays gets out than this, ambient occlusion without a radius is all but black.
+/// Share of occlusion rays that get out below which unlimited ambient occlusion is all but black.
 pub const CLOSED: f64 = 0.1;
 
 /// Occlusion of the surfaces in view.
@@ -23,21 +23,19 @@ pub const CLOSED: f64 = 0.1;
 pub struct Openness {
     /// Share of occlusion rays that hit nothing: the mean ambient visibility without a radius.
     pub open: f64,
-    /// The largest radius, in scene units and with two significant digits, at which the mean ambient visibility is [`TARGET`] or more; infinite if it is without a radius.
+    /// The largest radius, in scene units and with two significant digits, at which the mean
+    /// ambient visibility is [`TARGET`] or more; infinite if it is without a radius.
     pub radius: f64,
 }
 
 impl Openness {
-    /// The AO radius to use, in scene units, where one is to be chosen (`is_auto`) or none was given; `None` for no limit.
+    /// The AO radius to use, scene units, if one is to be chosen (`is_auto`) or none is given.
     pub fn limit(&self, is_auto: bool) -> Option<f64> {
         (self.radius.is_finite() && (is_auto || self.open < CLOSED)).then_some(self.radius)
     }
 }
 
-/// Measures how open the surfaces are that a camera sees, by a few thousand rays; `None` if it sees none. `size`: of the scene, in scene units.
-///
-/// # Errors
-/// Those of `trace`.
+/// Measures how open the surfaces are that a camera sees, if any. `size`: of the scene.
 pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result<Option<Openness>> {
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
@@ -65,7 +63,7 @@ pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result
     Ok(Some(Openness { open, radius: if radius.is_finite() { significant(radius, 2) } else { f64::INFINITY } }))
 }
 
-/// The `k`-th direction of a low-discrepancy sequence (Roberts' R2), distributed as the cosine with a normal.
+/// The `k`-th direction of a low-discrepancy sequence (Roberts' R2), distributed as the cosine.
 fn cosine_direction(normal: DVec3, k: usize) -> DVec3 {
     let u = (0.5 + 0.754_877_666_246_692_7 * k as f64).fract();
     let v = (0.5 + 0.569_840_290_998_053_2 * k as f64).fract();

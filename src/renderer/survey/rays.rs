@@ -6,12 +6,12 @@ use super::VisibleSurface;
 use crate::ray::Hit;
 use crate::scene::{Camera, Geometry, Projection, Scene};
 
-/// Distances along a ray from the camera at which it passes the clipping planes. `direction` has unit length.
+/// Distances of the clipping planes along a ray from the camera, of unit `direction`.
 pub fn clipped(camera: &Camera, direction: DVec3) -> [f64; 2] {
     camera.clip.of_ray(-camera.camera_to_world.matrix3.z_axis.dot(direction))
 }
 
-/// Removes what lies beyond the far clipping plane from what the rays of a camera ([`camera_ray`]) see.
+/// Removes surfaces beyond the far clipping plane from those that camera rays hit.
 pub fn clip(camera: &Camera, rays: &[(DVec3, DVec3)], seen: &mut [Option<VisibleSurface>]) {
     for ((_, direction), seen) in rays.iter().zip(seen.iter_mut()) {
         let [near, far] = clipped(camera, *direction);
@@ -19,8 +19,8 @@ pub fn clip(camera: &Camera, rays: &[(DVec3, DVec3)], seen: &mut [Option<Visible
     }
 }
 
-/// The ray through a point of the image, in world space: `at` from the top left, (0, 0), to the bottom right, (1, 1). `aspect` is width over height. Returns origin,
-/// on the near clipping plane, and unit direction.
+/// Origin, on the near clipping plane, and unit direction in world space of the ray through a point
+/// of the image: `at` from (0, 0) at the top left to (1, 1). `aspect` is width over height.
 pub fn camera_ray(camera: &Camera, at: [f64; 2], aspect: f64) -> (DVec3, DVec3) {
     let (origin, direction) = unclipped_ray(camera, at, aspect);
     (origin + direction * clipped(camera, direction)[0], direction)
@@ -43,7 +43,7 @@ fn unclipped_ray(camera: &Camera, at: [f64; 2], aspect: f64) -> (DVec3, DVec3) {
     }
 }
 
-/// What rays see by their hits.
+/// The surfaces of the hits of rays.
 pub fn visible_surfaces(scene: &Scene, rays: &[(DVec3, DVec3)], hits: Vec<Option<Hit>>) -> Vec<Option<VisibleSurface>> {
     let of = |(hit, (from, direction)): (Option<Hit>, &(DVec3, DVec3))| {
         let hit = hit?;

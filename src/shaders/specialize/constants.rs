@@ -1,4 +1,4 @@
-//! The constants of a module, those it has and those that folding adds, and its types of which constants are followed.
+//! The constants of a module, its own and those that folding adds, and the types that are followed.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use super::fold::{Value, fold};
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Bool,
-    /// Of 32 bits, signed or not.
+    /// A 32-bit integer, signed or not.
     Int,
 }
 
@@ -90,12 +90,12 @@ impl Constants {
         self.kinds.contains_key(&ty)
     }
 
-    /// Of an id from outside of functions; others vary.
+    /// The value of an id from outside of functions; others vary.
     fn value(&self, id: u32) -> Value {
         self.values.get(&id).map_or(Value::Varying, |value| Value::Constant(*value))
     }
 
-    /// Of every id.
+    /// The values of all ids.
     pub(super) fn by_id(&self) -> Vec<Value> {
         let mut all = vec![Value::Varying; self.bound as usize];
         for (id, value) in &self.values {

@@ -8,7 +8,7 @@ use rspirv::spirv::Op;
 use super::constants::Constants;
 use super::fold::{Value, fold};
 
-/// What constant propagation finds.
+/// The result of constant propagation: values of ids, and branches that may be taken.
 pub(super) struct Flow {
     /// By id.
     values: Vec<Value>,
@@ -79,12 +79,12 @@ impl Flow {
             .unwrap_or(Value::Unseen)
     }
 
-    /// Of an id.
+    /// The value of an id.
     pub(super) fn value(&self, id: u32) -> Value {
         self.values.get(id as usize).copied().unwrap_or(Value::Varying)
     }
 
-    /// Of an instruction's operands.
+    /// The values of an instruction's operands.
     pub(super) fn operands(&self, instruction: &Instruction) -> Vec<Value> {
         instruction.operands.iter().map(|o| o.id_ref_any().map_or(Value::Varying, |id| self.value(id))).collect()
     }
@@ -99,18 +99,13 @@ impl Flow {
         self.positions.get(&label).is_some_and(|k| self.runs[*k])
     }
 
-    /// The only target of a branch that has several but whose selector is a constant. A branch that repeats a loop has none: every loop must keep one.
+    /// The only target of a branch with several whose selector is a constant. A branch that repeats
+    /// a loop has none: every loop must keep one.
     pub(super) fn only_target(&self, block: &Block) -> Option<u32> {
         let branch = block.instructions.last()?;
         let Value::Constant(selector) = self.value(branch.operands.first()?.id_ref_any()?) else { return None };
         let target = match (branch.class.opcode, &branch.operands[1..]) {
-            (Op::BranchConditional, [Operand::IdRef(yes), Operand::IdRef(no), ..]) => {
-                if selector != 0 {
-                    *yes
-                } else {
-                    *no
-                }
-            }
+            (Op::BranchConditional, [Operand::IdRef(yes), Operand::IdRef(no), ..]) => *if selector != 0 { yes } else { no },
             (Op::Switch, [Operand::IdRef(default), cases @ ..]) => {
                 let case = cases.chunks_exact(2).find(|case| case[0] == Operand::LiteralBit32(selector));
                 case.and_then(|case| case[1].id_ref_any()).unwrap_or(*default)
@@ -122,7 +117,7 @@ impl Flow {
         (!repeats).then_some(target)
     }
 
-    /// Blocks to which a block can branch as far as is known. Nothing of what an unseen selector selects is known.
+    /// Blocks that a block may branch to; none by a selector that is unseen so far.
     fn targets(&self, block: &Block) -> Vec<u32> {
         let Some(branch) = block.instructions.last() else { return Vec::new() };
         if let Some(only) = self.only_target(block) {

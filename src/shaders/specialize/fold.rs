@@ -2,7 +2,7 @@
 
 use rspirv::spirv::Op;
 
-/// What is known of a value.
+/// The knowledge of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Value {
     /// Nothing yet: the code that computes it has not been seen to run.
@@ -13,7 +13,7 @@ pub(super) enum Value {
     Varying,
 }
 
-/// The value of an operation on booleans or 32-bit integers; [`Value::Varying`] for those that are not folded.
+/// Folds an operation on booleans or 32-bit integers; [`Value::Varying`] for all others.
 pub(super) fn fold(op: Op, operands: &[Value]) -> Value {
     use Value::{Constant, Unseen, Varying};
     if let Some(value) = decided(op, operands) {
@@ -41,7 +41,7 @@ fn decided(op: Op, operands: &[Value]) -> Option<u32> {
     }
 }
 
-/// The operand that an operation returns unchanged, by its position, because the other ones are constants.
+/// Position of the operand that an operation returns unchanged, because the others are constants.
 pub(super) fn unchanged(op: Op, operands: &[Value]) -> Option<usize> {
     let neutral = match op {
         Op::Select => {

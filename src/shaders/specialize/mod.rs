@@ -1,9 +1,12 @@
-//! Specialization of SPIR-V before a driver sees it: constants take their values, branches that are never taken go, and so does what only they used.
+//! Specialization of SPIR-V before a driver sees it: constants take their values, branches that are
+//! never taken go, and so does what only they used.
 //!
-//! A kernel of ours contains every feature, and a scene's specialization constants switch off most of them. Drivers remove what is off, but Mesa's first
-//! parses all of it and runs its passes over it: most of the time in which a pipeline is created whose machine code is in the cache. What is done here is
-//! sparse conditional constant propagation (Wegman and Zadeck, "Constant propagation with conditional branches", TOPLAS 1991) of booleans and 32-bit
-//! integers, without floating-point arithmetic: what a shader computes stays the same bit for bit.
+//! A kernel of ours contains every feature, and a scene's specialization constants switch off most.
+//! Drivers remove what is off, but Mesa's first parses all of it and runs its passes over it: most
+//! of the time in which a pipeline is created whose machine code is in the cache. Here sparse
+//! conditional constant propagation (Wegman and Zadeck, "Constant propagation with conditional
+//! branches", TOPLAS 1991) follows booleans and 32-bit integers, without floating-point arithmetic:
+//! results stay the same bit for bit.
 //!
 //! The control flow stays structured (SPIR-V specification, section 2.11): `rewrite.rs` says how.
 
@@ -21,10 +24,11 @@ use rspirv::spirv::{Decoration, Op};
 use constants::Constants;
 use flow::Flow;
 
-/// Specializes a module.
+/// Specializes a module and returns its words.
 ///
-/// `spirv`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default; `reads_first`: what is the same
-/// for all invocations is read at the start, for drivers of CPUs (`uniform.rs`). Returns words.
+/// `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; others
+/// take their defaults. `reads_first`: what is the same for all invocations is read at the start,
+/// for drivers of CPUs (`uniform.rs`).
 ///
 /// # Errors
 /// A message, if it is no SPIR-V.

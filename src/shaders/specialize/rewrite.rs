@@ -1,9 +1,10 @@
 //! A function without what never runs, in structured control flow.
 //!
-//! - A selection whose condition is a constant becomes a branch, unless another branch, which has no merge block of its own, leaves the selection through its merge
-//!   block: then it becomes a switch with one case.
+//! - A selection whose condition is a constant becomes a branch, or a switch with one case if
+//!   another branch, which has no merge block of its own, leaves it through its merge block.
 //! - A switch keeps its merge block, to which its cases break.
-//! - A loop keeps its merge block and its continue target. If they never run, they stay without their contents.
+//! - A loop keeps its merge block and its continue target. If they never run, they stay without
+//!   their contents.
 
 use std::collections::{HashMap, HashSet};
 
@@ -72,7 +73,7 @@ fn branch(target: u32) -> Instruction {
     Instruction::new(Op::Branch, None, None, vec![Operand::IdRef(target)])
 }
 
-/// The merge instruction of a block; its first operands are the merge block and, of a loop, the continue target.
+/// The merge instruction of a block; its operands begin with merge block and continue target.
 fn merge_instruction(block: &Block) -> Option<&Instruction> {
     let (_, before) = block.instructions.split_last()?;
     before.last().filter(|i| matches!(i.class.opcode, Op::SelectionMerge | Op::LoopMerge))
@@ -110,7 +111,7 @@ fn shorten_branch(block: &mut Block, flow: &Flow, left: &HashSet<u32>, constants
     block.instructions.push(shortened);
 }
 
-/// What replaces values: constants, and operands that an instruction returns unchanged.
+/// Replacements of values: constants, and operands that an instruction returns unchanged.
 fn aliases(blocks: &[Block], flow: &Flow, constants: &mut Constants) -> HashMap<u32, u32> {
     let mut aliases = HashMap::new();
     for block in blocks.iter().zip(&flow.runs).filter(|(_, runs)| **runs).map(|(block, _)| block) {
@@ -145,7 +146,7 @@ fn resolve(aliases: &HashMap<u32, u32>, mut id: u32) -> u32 {
     id
 }
 
-/// Leaves a phi what comes from branches that are taken; a continue target without contents brings anything.
+/// Leaves a phi the values of branches that are taken; an emptied continue target brings any.
 fn keep_taken(phi: &mut Instruction, block: u32, stub: Option<u32>, flow: &Flow, constants: &mut Constants) {
     let mut kept: Vec<_> = incoming(phi).filter(|(_, from)| flow.is_taken(*from, block)).collect();
     if let (Some(stub), Some(ty)) = (stub, phi.result_type) {

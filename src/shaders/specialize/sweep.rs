@@ -75,7 +75,7 @@ fn is_pure(instruction: &Instruction, math: Option<u32>) -> bool {
             }
             _ => false,
         },
-        // composites; then conversions, arithmetic, logic and bits: the specification numbers them in a row
+        // composites; then conversions, arithmetic, logic and bits, numbered in a row
         _ => {
             (Op::VectorExtractDynamic as u32..=Op::Transpose as u32).contains(&(op as u32))
                 || (Op::ConvertFToU as u32..=Op::BitCount as u32).contains(&(op as u32))

@@ -30,7 +30,7 @@ fn blocks(module: &Module) -> impl Iterator<Item = (&Function, &Block)> {
     module.functions.iter().flat_map(|f| f.blocks.iter().map(move |b| (f, b)))
 }
 
-/// What the specification asks of a module, as far as specialization could break it.
+/// Asserts those rules of the specification that specialization could break.
 fn assert_valid(words: &[u32], what: &str) {
     let module = rspirv::dr::load_words(words).unwrap_or_else(|e| panic!("{what}: {e}"));
     let bound = module.header.as_ref().unwrap().bound;

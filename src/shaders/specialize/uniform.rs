@@ -1,19 +1,21 @@
 //! Reads what is the same for all invocations at the start of a compute shader.
 //!
-//! Parameters of a pass and fields of the scene's root are at addresses in push constants. Mesa's CPU driver reads such a value once for a vector of lanes where it knows that the first
-//! of them is active, which is before any branch that lanes may take differently; behind one (a thread beyond the last pixel has returned) it gathers the same word for each lane.
-//! So these reads move to the first block, each value once. It does so only where the address follows from push constants alone, so nothing else moves. GPUs have scalar registers for
-//! such values wherever they are read.
+//! Parameters of a pass and fields of the scene's root are at addresses in push constants. Mesa's
+//! CPU driver reads such a value once for a vector of lanes before any branch that lanes may take
+//! differently; behind one (a thread beyond the last pixel has returned) it gathers the same word
+//! for each lane. So these reads move to the first block, each value once, where the address
+//! follows from push constants alone. GPUs have scalar registers for such values.
 //!
-//! A read that moves is one that may not have happened otherwise. Addresses in push constants are valid or null, and nothing is read through one that the shader looks at. Only members
-//! that the shader declares `readonly` are read, at constant indices.
+//! A read that moves may not have happened otherwise. Addresses in push constants are valid or
+//! null, and nothing is read through one that the shader compares. Only members that the shader
+//! declares `readonly` are read, at constant indices.
 
 use std::collections::{HashMap, HashSet};
 
 use rspirv::dr::{Block, Function, Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, ExecutionModel, MemoryAccess, Op, StorageClass};
 
-/// Moves the reads of a compute shader's entry point. Functions that it calls keep theirs: the optimizer has inlined them.
+/// Moves the reads of a compute shader's entry point; the optimizer has inlined the others.
 pub(super) fn read_first(module: &mut Module) {
     let entry = module.entry_points.iter().find_map(|e| match e.operands[..] {
         [Operand::ExecutionModel(ExecutionModel::GLCompute), Operand::IdRef(id), ..] => Some(id),
@@ -24,8 +26,8 @@ pub(super) fn read_first(module: &mut Module) {
     let Some(function) = module.functions.iter_mut().find(is_entry).filter(|_| entry.is_some()) else { return };
     // what the shader looks at is known once all that might move is: then less of it does
     let everything = Moves::new(&function.blocks, &facts, &HashSet::new());
-    let looked_at = everything.looked_at(&function.blocks);
-    let moves = Moves::new(&function.blocks, &facts, &looked_at);
+    let examined = everything.examined(&function.blocks);
+    let moves = Moves::new(&function.blocks, &facts, &examined);
     for block in &mut function.blocks {
         block.instructions.retain(|i| !i.result_id.is_some_and(|id| moves.same.contains_key(&id)));
         for id in block.instructions.iter_mut().flat_map(|i| &mut i.operands).filter_map(Operand::id_ref_any_mut) {
@@ -38,7 +40,7 @@ pub(super) fn read_first(module: &mut Module) {
     }
 }
 
-/// What the module says about types, constants and variables.
+/// The module's types, constants and variables.
 struct Facts {
     /// Storage class and pointee, by the id of a pointer's type.
     pointers: HashMap<u32, (StorageClass, u32)>,
@@ -77,7 +79,7 @@ impl Facts {
         facts
     }
 
-    /// Whether a read-only structure is what a pointer of this type points at, if its member of this number is asked for.
+    /// Whether a pointer of this type points at a structure whose member is read-only.
     fn is_readonly(&self, pointer: u32, member: u32) -> bool {
         matches!(self.pointers.get(&pointer), Some((StorageClass::PhysicalStorageBuffer, pointee)) if self.readonly.contains(&(*pointee, member)))
     }
@@ -92,13 +94,13 @@ struct Moves {
     same: HashMap<u32, u32>,
     /// Results that follow from push constants alone, and what each is made of.
     from_push: HashMap<u32, Vec<u32>>,
-    /// Those that are pointers.
+    /// The results that are pointers.
     pointers: HashSet<u32>,
 }
 
 impl Moves {
-    /// `looked_at`: addresses through which nothing is read.
-    fn new(blocks: &[Block], facts: &Facts, looked_at: &HashSet<u32>) -> Self {
+    /// `examined`: addresses through which nothing is read.
+    fn new(blocks: &[Block], facts: &Facts, examined: &HashSet<u32>) -> Self {
         let mut moves = Self::default();
         let mut types = facts.types.clone();
         let mut known: HashMap<String, u32> = HashMap::new();
@@ -109,7 +111,7 @@ impl Moves {
             for operand in moved.operands.iter_mut().filter_map(Operand::id_ref_any_mut) {
                 *operand = moves.same.get(operand).copied().unwrap_or(*operand);
             }
-            let Some(is_from_push) = moves.place(&moved, facts, &types, looked_at) else { continue };
+            let Some(is_from_push) = moves.place(&moved, facts, &types, examined) else { continue };
             let key = format!("{:?} {ty} {:?}", moved.class.opcode, moved.operands);
             let first = *known.entry(key).or_insert(id);
             moves.same.insert(id, first);
@@ -126,8 +128,8 @@ impl Moves {
         moves
     }
 
-    /// Whether an instruction moves, and if so whether its result follows from push constants alone.
-    fn place(&self, i: &Instruction, facts: &Facts, types: &HashMap<u32, u32>, looked_at: &HashSet<u32>) -> Option<bool> {
+    /// Whether an instruction moves, and if so whether its result depends on push constants alone.
+    fn place(&self, i: &Instruction, facts: &Facts, types: &HashMap<u32, u32>, examined: &HashSet<u32>) -> Option<bool> {
         let is_from_push = |id: &u32| self.from_push.contains_key(id);
         let is_known = |o: &Operand| o.id_ref_any().is_none_or(|id| is_from_push(&id) || facts.numbers.contains_key(&id));
         let class = |id: &u32| types.get(id).and_then(|ty| facts.pointers.get(ty)).map(|p| p.0);
@@ -148,7 +150,7 @@ impl Moves {
                 (is_plain && is_from_push(pointer)).then(|| class(pointer) == Some(StorageClass::PushConstant))
             }
             (Op::Bitcast | Op::ConvertUToPtr, [Operand::IdRef(address)]) => {
-                (is_from_push(address) && !looked_at.contains(address)).then_some(true)
+                (is_from_push(address) && !examined.contains(address)).then_some(true)
             }
             (Op::CompositeExtract, [Operand::IdRef(from), ..]) => self.same.contains_key(from).then(|| is_from_push(from)),
             // the address of what lies behind something
@@ -158,21 +160,21 @@ impl Moves {
     }
 
     /// Addresses with which the shader does other things than reading through them.
-    fn looked_at(&self, blocks: &[Block]) -> HashSet<u32> {
+    fn examined(&self, blocks: &[Block]) -> HashSet<u32> {
         let stay =
             blocks.iter().flat_map(|b| &b.instructions).filter(|i| !i.result_id.is_some_and(|id| self.same.contains_key(&id)));
         let used = stay.flat_map(|i| i.operands.iter().filter_map(Operand::id_ref_any));
         let mut waiting: Vec<u32> = used.filter_map(|id| self.same.get(&id).copied()).collect();
-        let mut looked_at = HashSet::new();
+        let mut examined = HashSet::new();
         while let Some(id) = waiting.pop() {
             // a pointer is followed, not looked at, and what is read through it is no address
             let made_of = self.from_push.get(&id).filter(|_| !self.pointers.contains(&id));
             if let Some(made_of) = made_of
-                && looked_at.insert(id)
+                && examined.insert(id)
             {
                 waiting.extend(made_of);
             }
         }
-        looked_at
+        examined
     }
 }
