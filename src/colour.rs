@@ -10,7 +10,8 @@ pub fn srgb_decode(coded: f32) -> f32 {
     if coded <= 0.04045 { coded / 12.92 } else { ((coded + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A linear value to 8-bit sRGB, rounded to nearest. NaN is black, so that it can be seen on a bright image.
+/// A linear value to 8-bit sRGB, rounded to nearest. NaN is black, so that it can be seen on a
+/// bright image.
 pub fn srgb_byte(linear: f32) -> u8 {
     // a cast from NaN gives 0
     (srgb_encode(linear.clamp(0.0, 1.0)) * 255.0).round() as u8

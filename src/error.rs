@@ -1,5 +1,6 @@
-//! What can go wrong, in words a user can act on. Every error is one line that names the thing and the remedy, and has a
-//! documented exit code (`skylit --help` and the README list them).
+//! The errors of the whole program, in words a user can act on. Every error is one line that names
+//! the thing and the remedy, and has a documented exit code (`skylit --help` and the README list
+//! them).
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,8 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
 
-    /// No Vulkan loader, no device, or a device below the floor; no library that was asked for. The text names what is missing.
+    /// No Vulkan loader, no device, or a device below the floor; no library that was asked for. The
+    /// text names what is missing.
     #[error("{0}")]
     Device(String),
 
@@ -22,11 +24,12 @@ pub enum Error {
     Input {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it and what helps.
+        /// The fault and the remedy.
         message: String,
     },
 
-    /// A scene that cannot be rendered (no triangles, NaN in the vertices), whichever file it came from.
+    /// A scene that cannot be rendered (no triangles, NaN in the vertices), whichever file it came
+    /// from.
     #[error("{0}")]
     Scene(String),
 
@@ -47,7 +50,8 @@ pub enum Error {
     #[error("the Vulkan device was lost: {0}")]
     DeviceLost(String),
 
-    /// A check that skylit was asked to make could not be made (`skylit verify` without a manifest, a frame that could not be rendered).
+    /// A check that skylit was asked to make could not be made (`skylit verify` without a manifest,
+    /// a frame that could not be rendered).
     #[error("{0}")]
     NotVerified(String),
 
@@ -64,10 +68,11 @@ pub enum Error {
     CheckFailed(String),
 }
 
-/// What an error says where this process, or the whole system, has as many files open as it may.
+/// The text of an error where this process, or the whole system, has as many files open as it may.
 const NO_DESCRIPTORS: &str = "too many files are open: raise the limit (`ulimit -n`), or end other programs";
 
-/// Returns true for the error of a system that opens no further file: the standard library has no kind for `EMFILE` and `ENFILE`, which have the same numbers on all Unix systems.
+/// Returns true for the error of a system that opens no further file: the standard library has no
+/// kind for `EMFILE` and `ENFILE`, which have the same numbers on all Unix systems.
 pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
     cfg!(unix) && matches!(error.raw_os_error(), Some(23 | 24))
 }
@@ -87,8 +92,8 @@ impl Error {
         }
     }
 
-    /// An input file that is wrong in the way `message` says. Control characters, which names in a file may have, become spaces: the error is one line, and tells a terminal
-    /// nothing.
+    /// An input file that is wrong in the way `message` says. Control characters, which names in a
+    /// file may have, become spaces: the error is one line, and tells a terminal nothing.
     pub fn input(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
         let mut message = message.into();
         if message.contains(char::is_control) {
@@ -97,9 +102,9 @@ impl Error {
         Error::Input { path: path.as_ref().to_owned(), message }
     }
 
-    /// Of this file, where the text does not say so already: for memory that ran out while it was read.
+    /// The same error, named after a file where memory ran out while that was read.
     #[must_use]
-    pub fn of(self, path: impl AsRef<Path>) -> Self {
+    pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         match self {
             Error::OutOfMemory(message) => Error::OutOfMemory(format!("{}: {message}", path.as_ref().display())),
             other => other,

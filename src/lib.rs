@@ -1,10 +1,14 @@
-//! A Vulkan renderer for ambient occlusion: in real time, as a path-traced ground truth, and in numbers that say how far apart the two are.
+//! A Vulkan renderer for ambient occlusion: in real time, as a path-traced ground truth, and in
+//! numbers that say how far apart the two are.
 //!
-//! [`Renderer`] opens a scene on a device and renders stills and frames of it; [`renderer`] has an example. Its settings are [`renderer::RenderSettings`],
-//! which the command line is made of, too. What it returns are images ([`output`]) with channels, metadata and a report; [`measure`] compares them.
+//! [`Renderer`] opens a scene on a device and renders stills and frames of it; [`renderer`] has an
+//! example. Its settings are [`renderer::RenderSettings`], which the command line is made of, too.
+//! What it returns are images ([`output`]) with channels, metadata and a report; [`measure`]
+//! compares them.
 //!
-//! Three tracers make one image on any Vulkan 1.3 device ([`tracer`]): ray-tracing pipelines, ray queries, and compute shaders over a hierarchy of our own.
-//! ARCHITECTURE.md draws the whole and says which files to touch for what; each module's first lines say what it is for.
+//! Three tracers make one image on any Vulkan 1.3 device ([`tracer`]): ray-tracing pipelines, ray
+//! queries, and compute shaders over a hierarchy of our own. ARCHITECTURE.md draws the whole and
+//! says which files to touch for what; each module's first lines say what it is for.
 
 #![deny(unsafe_code)]
 

@@ -12,7 +12,8 @@ impl Hit {
     }
 }
 
-/// Translates ray origins between the world coordinates of files and the tracers' coordinates, which differ for a scene far from the origin.
+/// Translates ray origins between the world coordinates of files and the tracers' coordinates,
+/// which differ for a scene far from the origin.
 pub fn translate(rays: &mut [Ray], by: glam::DVec3) {
     if by != glam::DVec3::ZERO {
         for r in rays {

@@ -359,38 +359,30 @@ fn limits(
     structure: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR,
     pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR,
 ) -> Limits {
+    // what the invocations of a subgroup can do together
+    let can = |operations| {
+        v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::BASIC | operations)
+    };
+    let has_ballot = can(vk::SubgroupFeatureFlags::BALLOT);
+    let has_arithmetic = can(vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC);
+    let is_full = (8..=64).contains(&v11.subgroup_size) && f13.compute_full_subgroups == vk::TRUE;
+
+    // the rest is as the structures have it
+    let limits = &properties.limits;
     Limits {
         subgroup_size: v11.subgroup_size,
-        subgroup_ballot: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT),
-        packets: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-            && v11.subgroup_supported_operations.contains(
-                vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC,
-            )
-            && (8..=64).contains(&v11.subgroup_size)
-            && f13.compute_full_subgroups == vk::TRUE,
-        max_workgroups_x: properties.limits.max_compute_work_group_count[0],
-        max_image_side: [
-            properties.limits.max_image_dimension2_d,
-            properties.limits.max_framebuffer_width,
-            properties.limits.max_framebuffer_height,
-        ]
-        .into_iter()
-        .min()
-        .unwrap_or(0),
-        max_push_constants: properties.limits.max_push_constants_size,
-        max_viewport_side: properties
-            .limits
-            .max_viewport_dimensions
-            .map(|n| n as f32)
+        subgroup_ballot: has_ballot,
+        packets: has_arithmetic && is_full,
+        max_workgroups_x: limits.max_compute_work_group_count[0],
+        max_image_side: [limits.max_image_dimension2_d, limits.max_framebuffer_width, limits.max_framebuffer_height]
             .into_iter()
-            .fold(f32::INFINITY, f32::min),
-        viewport_range: properties.limits.viewport_bounds_range,
-        timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
-            properties.limits.timestamp_period
-        } else {
-            0.0
-        },
+            .min()
+            .unwrap_or(0),
+        max_push_constants: limits.max_push_constants_size,
+        max_viewport_side: limits.max_viewport_dimensions.map(|n| n as f32).into_iter().fold(f32::INFINITY, f32::min),
+        viewport_range: limits.viewport_bounds_range,
+        timestamp_period: if limits.timestamp_compute_and_graphics == vk::TRUE { limits.timestamp_period } else { 0.0 },
         scratch_alignment: structure.min_acceleration_structure_scratch_offset_alignment,
         shader_group_handle_size: pipeline.shader_group_handle_size,
         shader_group_handle_alignment: pipeline.shader_group_handle_alignment,

@@ -468,7 +468,7 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
         let size = Window::from(header.data_window()).size;
         // as they are shown, and before that as they are read
         let taken = budget.take_for_now(bytes(display), bytes(data), || format!("an image of {}x{} pixels", size.0, size.1));
-        taken.or_else(|_| budget.check().map_err(|e| e.of(path)))?;
+        taken.or_else(|_| budget.check().map_err(|e| e.in_file(path)))?;
     }
     if has_block_that_is_too_large(open(), &meta).map_err(broken)? {
         return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));

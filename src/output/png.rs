@@ -165,7 +165,7 @@ pub fn read(path: &Path, budget: &Budget) -> Result<Image> {
     };
     let max = MaxSize { side: 1 << 20, pixels_per_byte: None, budget, pixel_bytes };
     let decoded = decode(&bytes, format, max);
-    budget.check().map_err(|e| e.of(path))?;
+    budget.check().map_err(|e| e.in_file(path))?;
     let decoded = decoded.map_err(|e| Error::input(path, format!("not a readable {name}: {e}")))?;
 
     // What the file says of its values.

@@ -210,8 +210,8 @@ impl RenderArgs {
     /// The files that it reads, as far as the command line tells, and those that it will write.
     ///
     /// # Errors
-    /// Those of [`FramePattern::from_path`], and [`Error::Usage`] for a file that would replace the one of
-    /// `--resume` and is no image.
+    /// Those of [`FramePattern::from_path`], and [`Error::Usage`] for a file that would replace the
+    /// one of `--resume` and is no image.
     pub fn plan(&self, defaults: &[DefaultsReport]) -> Result<FilePlan> {
         let (mut plan, settings) = (FilePlan::default(), &self.settings);
 

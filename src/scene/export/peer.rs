@@ -116,7 +116,7 @@ fn textures(scene: &Scene, files: &mut Files) -> Result<Vec<Value>> {
     textures.collect()
 }
 
-/// What surrounds the scene, the texels of a map in a file.
+/// The environment, the texels of a map in a file.
 fn environment(scene: &Scene, files: &mut Files) -> Result<Value> {
     Ok(match &scene.environment {
         Environment::Black => Value::Null,

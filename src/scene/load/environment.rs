@@ -84,7 +84,7 @@ fn read(path: &Path, budget: &Budget) -> Result<Pixels> {
     // texels on the device, and the table by which they are sampled
     let pixel_count = u64::from(pixels.width) * u64::from(pixels.height);
     let what = || format!("an environment of {}x{} pixels", pixels.width, pixels.height);
-    budget.take(pixel_count * DEVICE_BYTES, what).or_else(|_| budget.check().map_err(|e| e.of(path)))?;
+    budget.take(pixel_count * DEVICE_BYTES, what).or_else(|_| budget.check().map_err(|e| e.in_file(path)))?;
     if let Some(replaced) = Replaced::count(&pixels.radiance) {
         pixels.radiance = pixels.radiance.iter().map(|c| Vec3::from_array(c.to_array().map(admissible))).collect();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -143,7 +143,7 @@ fn read_hdr(path: &Path, budget: &Budget) -> Result<Pixels> {
     let bytes = files::read(path)?;
     budget.read(bytes.len());
     let image = radiance::decode(bytes, MAX_SIDE, budget);
-    budget.check().map_err(|e| e.of(path))?;
+    budget.check().map_err(|e| e.in_file(path))?;
     let image = image.map_err(|e| Error::input(path, e))?;
     let radiance = image.rgb.into_iter().map(Vec3::from_array).collect();
     Ok(Pixels { width: image.width, height: image.height, radiance, warning: None })
@@ -154,7 +154,7 @@ fn read_picture(path: &Path, budget: &Budget) -> Result<Pixels> {
     let bytes = files::read(path)?;
     budget.read(bytes.len());
     let p = picture::decode(&bytes, &path.to_string_lossy(), budget);
-    budget.check().map_err(|e| e.of(path))?;
+    budget.check().map_err(|e| e.in_file(path))?;
     let p = p.map_err(|e| Error::input(path, e))?;
     let is_linear = png::is_linear(&bytes[..]);
     let linear = |i| {

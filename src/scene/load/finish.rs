@@ -29,7 +29,7 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<
     ranges::apply(scene);
     texture_slots(scene);
     bake_singular(scene, budget);
-    budget.check().map_err(|e| e.of(path))?;
+    budget.check().map_err(|e| e.in_file(path))?;
     drop_unplaced(scene);
 
     let materials = &scene.materials;

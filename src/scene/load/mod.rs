@@ -104,7 +104,7 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let budget = Budget::default();
     let outcome = read(path, Loading { options: LoadOptions { confine, ..*options }, budget: &budget });
     // for which readers have other errors, or warnings
-    budget.check().map_err(|e| e.of(path))?;
+    budget.check().map_err(|e| e.in_file(path))?;
     let mut scene = outcome?;
     scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

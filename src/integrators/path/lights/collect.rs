@@ -1,5 +1,5 @@
-//! What lights are collected with: how bright one is, what does not change while they move, and the
-//! lists to which each kind adds its own.
+//! Collecting lights: how bright one is, what does not change while they move, and the lists to
+//! which each kind adds its own.
 
 use std::collections::HashMap;
 

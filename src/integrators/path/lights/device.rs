@@ -64,7 +64,8 @@ impl DeviceLights {
             && self.lights.light_of == lights.light_of
     }
 
-    /// Checks that shaders compiled for these lights, with `features` and for `kinds`, find what they read of others.
+    /// Checks that shaders compiled for these lights, with `features` and for `kinds`, find what
+    /// they read of others.
     ///
     /// # Errors
     /// [`Error::Scene`] if they do not.

@@ -1,5 +1,7 @@
-//! Triangles whose radiance a texture says. Each is sampled as many lights, its *parts*, so that samples go where the picture is bright: the light tree chooses among
-//! parts as among other lights, and shaders find the part that a ray hits by its barycentrics (`part_at` of shaders/lights/triangle.glsl).
+//! Triangles whose radiance a texture says. Each is sampled as many lights, its *parts*, so that
+//! samples go where the picture is bright: the light tree chooses among parts as among other
+//! lights, and shaders find the part that a ray hits by its barycentrics (`part_at` of
+//! shaders/lights/triangle.glsl).
 
 use glam::{DVec2, Vec3};
 
@@ -13,9 +15,11 @@ const MAX_SIDE: u32 = 16;
 const MAX_PARTS: usize = 4096;
 /// Points along an edge of a part at which the texture is looked up; an estimate suffices.
 const POINTS: u32 = 4;
-/// Radiance that a part counts with at least, as a fraction of its triangle's mean: interpolation of texels may bring light to where the points are dark.
+/// Radiance that a part counts with at least, as a fraction of its triangle's mean: interpolation
+/// of texels may bring light to where the points are dark.
 const LEAST: f64 = 0.05;
-/// A triangle stays whole where its parts differ by less from their mean, as a fraction of it (root mean square).
+/// A triangle stays whole where its parts differ by less from their mean, as a fraction of it (root
+/// mean square).
 const EVEN: f64 = 0.2;
 
 /// A part of a triangle.
@@ -23,16 +27,17 @@ const EVEN: f64 = 0.2;
 pub(super) struct Part {
     /// Barycentrics of its corner in the triangle.
     pub corner: DVec2,
-    /// Its edges, as fractions of those of the triangle: negative where it is turned around.
+    /// Length of its edges, as a fraction of those of the triangle; negative: it is turned around.
     pub scale: f64,
-    /// What [`LightRecord::flags`](crate::interface::records::lights::LightRecord::flags) says of it.
+    /// Bits of it in [`LightRecord::flags`](crate::interface::records::lights::LightRecord::flags).
     pub flags: u32,
     /// Brightness of its mean radiance ([`brightness`]).
     pub brightness: f64,
 }
 
 impl Part {
-    /// Barycentrics in the triangle of a point of the part. `in_whole` of shaders/lights/triangle.glsl.
+    /// Barycentrics in the triangle of a point of the part. `in_whole` of
+    /// shaders/lights/triangle.glsl.
     fn in_whole(&self, at: DVec2) -> DVec2 {
         self.corner + self.scale * at
     }
@@ -56,8 +61,9 @@ pub(super) fn side(triangles: usize) -> u32 {
     [MAX_SIDE, 8, 4, 2].into_iter().find(fits).unwrap_or(1)
 }
 
-/// The parts of a triangle with `side` of them along each edge, in the order of their numbers: rows along the second edge, in each the parts of its cells, a turned one after
-/// one that lies as the triangle does.
+/// The parts of a triangle with `side` of them along each edge, in the order of their numbers: rows
+/// along the second edge, in each the parts of its cells, a turned one after one that lies as the
+/// triangle does.
 fn grid(side: u32) -> impl Iterator<Item = Part> {
     let scale = 1.0 / f64::from(side);
     let cells = (0..side).flat_map(move |row| (0..side - row).map(move |column| (row, column)));
@@ -70,7 +76,7 @@ fn grid(side: u32) -> impl Iterator<Item = Part> {
     })
 }
 
-/// What a texture shows on the triangles of a mesh.
+/// The picture that a texture shows on the triangles of a mesh.
 pub(super) struct Picture<'s> {
     mesh: &'s TriangleMesh,
     texture: &'s Texture,
@@ -80,7 +86,8 @@ pub(super) struct Picture<'s> {
 }
 
 impl<'s> Picture<'s> {
-    /// What the texture of `slot` shows on `mesh`. `emissive`: radiance where it is white, linear RGB.
+    /// The picture that the texture of `slot` shows on `mesh`. `emissive`: radiance where it is
+    /// white, linear RGB.
     pub fn new(scene: &'s Scene, mesh: &'s TriangleMesh, slot: TextureSlot, emissive: Vec3) -> Self {
         Self { mesh, texture: &scene.textures[slot.texture], slot, emissive }
     }
@@ -90,7 +97,8 @@ impl<'s> Picture<'s> {
         (0..self.mesh.indices.len()).map(|k| self.parts(k, side, whole)).collect()
     }
 
-    /// The parts of a triangle, or none if it had better be sampled as a whole. `whole`: brightness of the mean radiance of all triangles.
+    /// The parts of a triangle, or none if it had better be sampled as a whole. `whole`: brightness
+    /// of the mean radiance of all triangles.
     fn parts(&self, triangle: usize, side: u32, whole: f64) -> Vec<Part> {
         let coordinates = self.mesh.texcoords.get(self.slot.texcoord).filter(|c| !c.is_empty());
         let Some(coordinates) = coordinates.filter(|_| side > 1 && !self.texture.texels.is_empty()) else { return Vec::new() };

@@ -8,10 +8,12 @@ use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
 use crate::scene::Scene;
 
-/// Fraction of the environment's samples that do not use portals, because light may enter elsewhere.
+/// Fraction of the environment's samples that do not use portals, because light may enter
+/// elsewhere.
 const ENVIRONMENT_SHARE: f64 = 0.2;
 
-/// Adds the environment, followed by the scene's portals; returns its index. Portals are chosen by the light that enters through them.
+/// Adds the environment, followed by the scene's portals; returns its index. Portals are chosen by
+/// the light that enters through them.
 pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, scene: &Scene) -> Option<u32> {
     let brightness = brightness(builder.environment);
     let portals: Vec<_> = scene.portals.iter().filter(|p| p.area() > 0.0).collect();

@@ -16,15 +16,18 @@ use crate::scene::{AlphaMode, Geometry, Material, Scene, TriangleMesh};
 /// Bound of the rounding error of a point on a light, as a fraction of its coordinates.
 const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 
-/// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a non-uniform scale has no closed form: only BSDF sampling finds
-/// it.
+/// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a
+/// non-uniform scale has no closed form: only BSDF sampling finds it.
 pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &Scene) -> Vec<u32> {
     let LightBuilder { origin, alpha, moves, means, side, parts, .. } = builder;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
+
+    // what emits and is there
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
-        // unlit surfaces are visible but illuminate nothing; surfaces that no ray can hit are neither
+        // unlit surfaces are visible but illuminate nothing; surfaces that no ray can hit are
+        // neither
         if material.emissive == Vec3::ZERO || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
             continue;
         }
@@ -44,6 +47,8 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
             1.0
         };
         let brightness = of_textures * alpha_factor;
+
+        // its lights, one or more a primitive
         let first = of_primitives.len();
         match &mesh.geometry {
             Geometry::Triangles(t) => {
@@ -58,7 +63,8 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                     let all_parts = || Picture::new(scene, t, slot, material.emissive).all_parts(*side, of_textures);
                     &*parts.entry(instance.mesh).or_insert_with(all_parts)
                 });
-                // none, one, or many lights of a triangle: in proportion to its own brightness, and alpha for all alike
+                // none, one, or many lights of a triangle: in proportion to its own brightness, and
+                // alpha for all alike
                 let parts = |k: usize| pictured.map_or(&[][..], |parts| &parts[k]);
                 let lights =
                     add_triangles(all, t, point, plain, (brightness, alpha_factor), parts, LightRecord { flags, ..base });
@@ -96,6 +102,8 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
         }
         light_of[i] = (scene.instances.len() + first) as u32;
     }
+
+    // no table where nothing emits
     if light_of.iter().all(|&first| first == INVALID) {
         return Vec::new();
     }
@@ -119,6 +127,8 @@ fn add_triangles<'p>(
     let two_sided = base.flags & LIGHT_TWO_SIDED != 0;
     // a mirroring transform reverses the winding
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
+
+    // a light with its bounds
     let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, part: (u32, f64), brightness: f64| {
         let (flags, share) = part;
         let normal = turn * e1.cross(e2);
@@ -148,6 +158,8 @@ fn add_triangles<'p>(
         };
         all.push_part(record, bounds, share)
     };
+
+    // two triangles, a triangle, or its parts at a time
     let whole = (0, 1.0);
     let mut k = 0;
     while k < mesh.indices.len() {
@@ -176,7 +188,8 @@ fn add_triangles<'p>(
     of_primitives
 }
 
-/// The rectangle that two triangles form, as a corner and two edges, with the error of its corners; `None` if they form none.
+/// The rectangle that two triangles form, as a corner and two edges, with the error of its corners;
+/// `None` if they form none.
 fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)> {
     let extent = first.iter().chain(&second).fold(0.0f64, |e, p| e.max(p.abs().max_element()));
     // positions are rounded to single precision, both in object and in world space
