@@ -17,8 +17,8 @@ use shaderc_libraries as _;
 use super::source::{Source, Stage};
 
 /// A cache of SPIR-V on disk, shared by all build profiles and later runs: files `KEY.spv` in the
-/// folder `target/spirv`. The key is a hash of the source with all includes, so that a change
-/// recompiles only the shaders that include it.
+/// folder `target/spirv`. The key is a hash of the code with all includes, so that a change
+/// recompiles only the shaders that include it, and one of comments none.
 struct Cache {
     folder: PathBuf,
     // version of the compiler
@@ -35,6 +35,13 @@ fn optimization(source: &Source) -> OptimizationLevel {
     } else {
         OptimizationLevel::Performance
     }
+}
+
+/// Adds a text to a hash, but for comments and blank lines: without debug information SPIR-V knows
+/// nothing of them.
+fn hash_code(text: &str, hash: &mut DefaultHasher) {
+    let code = text.lines().map(|line| line.split_once("//").map_or(line, |(code, _)| code).trim_end());
+    code.filter(|line| !line.is_empty()).for_each(|line| line.hash(hash));
 }
 
 /// Compiles the shaders of one folder.
@@ -98,7 +105,7 @@ impl Compiler {
         // two hashes of 64 bits
         let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
         hashes[1].write_u8(1);
-        let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
+        let mut add = |text: &str| hashes.iter_mut().for_each(|h| hash_code(text, h));
         add(&format!("{:?} {:?}", source.stage(), optimization(source)));
         let (mut names, mut paths, mut texts) = (BTreeSet::new(), BTreeSet::new(), vec![text.to_owned()]);
         while let Some(text) = texts.pop() {
@@ -179,7 +186,7 @@ impl Cache {
     fn path(&self, key: &str) -> PathBuf {
         let mut hash = DefaultHasher::new();
         self.compiler.hash(&mut hash);
-        include_str!("compiler.rs").hash(&mut hash);
+        hash_code(include_str!("compiler.rs"), &mut hash);
         self.folder.join(format!("{key}{:016x}.spv", hash.finish()))
     }
 
