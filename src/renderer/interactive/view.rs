@@ -260,9 +260,10 @@ impl View {
         let rests = self.camera.as_ref() == Some(camera) && !has_moved;
         self.camera = Some(camera.clone());
         self.pose = traced.pose;
+        let aspect = self.aspect();
         match &mut self.kind {
             Kind::Frames(view) => {
-                let record = CameraRecord::new(camera, traced.flat.origin, self.aspect());
+                let record = CameraRecord::new(camera, traced.flat.origin, aspect);
                 let moved = if has_moved { &traced.moved[..] } else { &[] };
                 view.resting = if rests && !view.was_interrupted { view.resting.saturating_add(1) } else { 0 };
                 let step = view.step(traced, &record, moved, control);
