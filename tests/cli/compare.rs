@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use serde_json::Value;
-use skylit::output::picture::{Colour, Picture};
+use skylit::output::picture::Picture;
+use skylit::output::png::Colour;
 use skylit::output::{self, Channel, Image, Samples};
 
 use crate::common::command::{device, fails, json, place, refuses, run, stderr};

@@ -4,7 +4,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
-use skylit::output::picture::{Colour, Picture};
+use skylit::output::picture::Picture;
+use skylit::output::png::Colour;
 
 use crate::common::command::{assert_refusal, json, refuses, run, skylit};
 
