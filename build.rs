@@ -253,7 +253,8 @@ fn write_table(shaders: &[Shader], out: &Path) {
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.
 fn compile(shaders: &[Shader], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let compiler = Compiler::new(&manifest.join("shaders"), source::generated_files(interface::glsl::files(), manifest), out);
+    let compiler =
+        Compiler::new(&manifest.join("shaders"), source::generated_files(interface::glsl::files(), manifest), out);
     let next = Mutex::new(shaders.iter());
     let results = Mutex::new((BTreeSet::new(), Vec::new()));
     std::thread::scope(|scope| {
@@ -272,7 +273,8 @@ fn compile(shaders: &[Shader], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf
                         }
                         Err(error) => results.1.push(error),
                     }
-                    std::fs::write(out.join(shader.source().file_name() + ".spv"), spirv).expect("OUT_DIR can be written");
+                    std::fs::write(out.join(shader.source().file_name() + ".spv"), spirv)
+                        .expect("OUT_DIR can be written");
                 }
             });
         }

@@ -42,7 +42,9 @@ fn scene(mesh: TriangleMesh, instances: usize) -> Scene {
     };
     Scene {
         meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0 }],
-        instances: (0..instances).map(|i| Instance { name: String::new(), mesh: 0, object_to_world: place(i) }).collect(),
+        instances: (0..instances)
+            .map(|i| Instance { name: String::new(), mesh: 0, object_to_world: place(i) })
+            .collect(),
         materials: vec![Default::default()],
         ..Default::default()
     }
@@ -95,9 +97,9 @@ fn build_compute(bencher: Bencher, n: usize) {
     let scene = scene(surface(n, 0.0), 1);
     let device = Device::open(&Options::default()).unwrap_or_else(|e| panic!("{e}"));
     let flat = FlatScene::new(&scene);
-    bencher
-        .counter(ItemsCount::new(n))
-        .bench_local(|| Tracer::new(&device, TracerKind::Compute, &flat, Needs::default()).unwrap().stats().build_seconds);
+    bencher.counter(ItemsCount::new(n)).bench_local(|| {
+        Tracer::new(&device, TracerKind::Compute, &flat, Needs::default()).unwrap().stats().build_seconds
+    });
 }
 
 const INSTANCES: [usize; 6] = [10, 100, 256, 1_000, 10_000, 100_000];
@@ -107,8 +109,9 @@ fn place(bencher: Bencher, kind: TracerKind, n: usize) {
     let scene = scene(surface(8, 0.0), n);
     let mut tracer = tracer(kind, &scene, Motion { instances: (0..n).collect(), meshes: Vec::new() });
     let poses = [0.0, 0.2].map(|by| {
-        let moved =
-            |(i, x): (usize, &Instance)| (i, DAffine3::from_translation(DVec3::splat(by * (i % 7) as f64)) * x.object_to_world);
+        let moved = |(i, x): (usize, &Instance)| {
+            (i, DAffine3::from_translation(DVec3::splat(by * (i % 7) as f64)) * x.object_to_world)
+        };
         scene.instances.iter().enumerate().map(moved).collect::<Vec<_>>()
     });
     let mut turn = 0;

@@ -133,7 +133,8 @@ impl Error {
             std::io::ErrorKind::StorageFull => "the disk is full".to_owned(),
             std::io::ErrorKind::QuotaExceeded => "the disk quota is used up".to_owned(),
             std::io::ErrorKind::FileTooLarge => {
-                "it would be larger than files may be here: raise the limit (`ulimit -f unlimited`), or write less".to_owned()
+                "it would be larger than files may be here: raise the limit (`ulimit -f unlimited`), or write less"
+                    .to_owned()
             }
             std::io::ErrorKind::NotFound => "its folder does not exist (create it first)".to_owned(),
             std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),

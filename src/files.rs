@@ -272,7 +272,8 @@ impl Temporary {
         {
             use std::os::unix::fs::OpenOptionsExt;
             let unnamed = i32::try_from(rustix::fs::OFlags::TMPFILE.bits()).unwrap_or_default();
-            let opened = OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
+            let opened =
+                OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
             // whatever keeps it from being created, a file with a name fails for the same reason,
             // or the file system has only those
             match opened {

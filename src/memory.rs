@@ -136,7 +136,8 @@ fn size(bytes: u64) -> String {
 /// of address space leaves of it.
 fn machine_memory() -> u64 {
     static MEMORY: OnceLock<u64> = OnceLock::new();
-    *MEMORY.get_or_init(|| [physical(), control_group(), address_space()].into_iter().flatten().min().unwrap_or(UNKNOWN))
+    *MEMORY
+        .get_or_init(|| [physical(), control_group(), address_space()].into_iter().flatten().min().unwrap_or(UNKNOWN))
 }
 
 #[cfg(target_os = "linux")]
@@ -166,7 +167,11 @@ fn group_limit(groups: &str, limit: impl Fn(&Path) -> Option<u64>) -> Option<u64
             _ => return None,
         };
         let group = Path::new(mount).join(group.trim_start_matches('/'));
-        group.ancestors().take_while(|folder| folder.starts_with(mount)).filter_map(|folder| limit(&folder.join(file))).min()
+        group
+            .ancestors()
+            .take_while(|folder| folder.starts_with(mount))
+            .filter_map(|folder| limit(&folder.join(file)))
+            .min()
     };
     groups.lines().filter_map(smallest).min()
 }
@@ -230,7 +235,10 @@ mod tests {
         budget.read(1 << 30);
         assert!(budget.take(0, || unreachable!()).is_err());
         let error = budget.check().unwrap_err();
-        assert!(error.exit_code() == 5 && error.to_string().starts_with("out of memory: image `a` takes 1.0 GiB"), "{error}");
+        assert!(
+            error.exit_code() == 5 && error.to_string().starts_with("out of memory: image `a` takes 1.0 GiB"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -125,8 +125,8 @@ fn dense_search(renderer: &mut Renderer, compared: &AoVersusPathSettings, radii:
     });
     let none = [0, 1].map(|half| render("lit", half, compared.ao_samples / 2, &lit(0.0, f64::INFINITY)));
     let mut explained = |radius: f64| -> f64 {
-        let signal =
-            [0usize, 1].map(|half| minus(render("lit", half as u32, compared.ao_samples / 2, &lit(1.0, radius)), &none[half]));
+        let signal = [0usize, 1]
+            .map(|half| minus(render("lit", half as u32, compared.ao_samples / 2, &lit(1.0, radius)), &none[half]));
         let sum = |c: usize, a: &[f64], b: &[f64]| a.iter().zip(b).skip(c).step_by(3).map(|(a, b)| a * b).sum::<f64>();
         (0..3)
             .map(|c| {
@@ -155,7 +155,10 @@ fn holds_against_dense_search(scene: Scene, settings: &AoVersusPathSettings) {
     let fit = &report.path[0];
     let found = fit.binary.radius.expect("a best radius");
     let dense = dense_search(&mut renderer, settings, &dense_radii(found, report.diagonal));
-    println!("{}: radius {found:.4}, dense search {dense:.4}; standard error {:?}", report.scene, fit.binary.standard_error);
+    println!(
+        "{}: radius {found:.4}, dense search {dense:.4}; standard error {:?}",
+        report.scene, fit.binary.standard_error
+    );
     assert!((found / dense - 1.0).abs() < 0.05, "{found}, {dense} by dense search");
     assert_validation_clean(renderer.device());
 }

@@ -211,7 +211,9 @@ fn imports() -> Vec<Import> {
 
 fn layer(room: &str) -> usize {
     LAYERS.iter().position(|l| l.contains(&room)).unwrap_or_else(|| {
-        panic!("src/{room} has no layer: add it to LAYERS in tests/architecture.rs and to the drawing in ARCHITECTURE.md")
+        panic!(
+            "src/{room} has no layer: add it to LAYERS in tests/architecture.rs and to the drawing in ARCHITECTURE.md"
+        )
     })
 }
 
@@ -268,8 +270,11 @@ fn the_drawing_shows_the_layers() {
 /// for among folders of which neither holds the other.
 #[test]
 fn folders_have_no_circles() {
-    let folders: BTreeSet<Vec<String>> =
-        files("src", &["rs"]).iter().map(|f| module_of(f)).flat_map(|m| (1..m.len()).map(move |n| m[..n].to_vec())).collect();
+    let folders: BTreeSet<Vec<String>> = files("src", &["rs"])
+        .iter()
+        .map(|f| module_of(f))
+        .flat_map(|m| (1..m.len()).map(move |n| m[..n].to_vec()))
+        .collect();
     let folder_of = |module: &[String]| -> Vec<String> {
         let holds = |n: &usize| folders.contains(&module[..*n]);
         module[..(1..=module.len()).rev().find(holds).unwrap_or(0)].to_vec()

@@ -44,7 +44,10 @@ fn device() -> Option<Arc<Device>> {
     );
     let tracer = tracer(&device, TracerKind::Compute, &scene("cornell-box"));
     let Err(error) = Raster::new(&tracer, &shaders::AOV_CLOSEST, SIZE) else { panic!("it can draw") };
-    assert!(error.to_string().contains("LP_NATIVE_VECTOR_WIDTH") && error.to_string().contains("--primary traced"), "{error}");
+    assert!(
+        error.to_string().contains("LP_NATIVE_VECTOR_WIDTH") && error.to_string().contains("--primary traced"),
+        "{error}"
+    );
     assert_eq!(Primary::auto(&tracer, 1 << 20).0, Primary::Traced);
     None
 }
@@ -106,7 +109,8 @@ impl Shot<'_> {
                 match hit.is_hit() {
                     true => {
                         let off = (hit.t as f32 - drawn.depth).abs();
-                        hit.instance == drawn.instance && (hit.primitive == drawn.primitive || off <= 1e-3 * drawn.depth)
+                        hit.instance == drawn.instance
+                            && (hit.primitive == drawn.primitive || off <= 1e-3 * drawn.depth)
                     }
                     false => drawn.instance == NONE,
                 }
@@ -147,7 +151,8 @@ impl Shot<'_> {
 
     fn check(&self, what: &str, tracer: &Tracer, bounds: Bounds) -> Difference {
         let [traced, drawn] = [Primary::Traced, Primary::Raster].map(|p| {
-            aov::render_with(tracer, &self.record(), self.size, p, &mut NoControl).unwrap_or_else(|e| panic!("{p:?}: {e}"))
+            aov::render_with(tracer, &self.record(), self.size, p, &mut NoControl)
+                .unwrap_or_else(|e| panic!("{p:?}: {e}"))
         });
         let d = self.compare(&traced, &drawn);
         println!("{what}, {}: {} pixels, {d:?}", tracer.kind(), traced.len());
@@ -160,7 +165,14 @@ impl Shot<'_> {
     }
 }
 
-fn check(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera, size: [u32; 2], bounds: Bounds) -> Difference {
+fn check(
+    device: &Arc<Device>,
+    what: &str,
+    scene: &Scene,
+    camera: &Camera,
+    size: [u32; 2],
+    bounds: Bounds,
+) -> Difference {
     let tracer = tracer(device, TracerKind::Compute, scene);
     Shot { scene, camera, size }.check(what, &tracer, bounds)
 }
@@ -214,11 +226,20 @@ fn gpu_every_tracers_scene_can_be_rasterized() {
 #[test]
 fn gpu_orthographic_views() {
     let Some(device) = device() else { return };
-    for (name, half) in [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 3.0), ("far-away", 2.0)] {
+    for (name, half) in
+        [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 3.0), ("far-away", 2.0)]
+    {
         let scene = scene(name);
         // faces seen exactly from their side, and edges along rows of pixels
         let bounds = Bounds { ids: 0.005, ..BOUNDS };
-        let d = check(&device, &format!("{name}, orthographic"), &scene, &orthographic(&scene.cameras[0], half), SIZE, bounds);
+        let d = check(
+            &device,
+            &format!("{name}, orthographic"),
+            &scene,
+            &orthographic(&scene.cameras[0], half),
+            SIZE,
+            bounds,
+        );
         assert!(d.hits > 10_000, "{name}: hardly anything is seen");
     }
     // from among the geometry: what lies behind is not seen
@@ -232,7 +253,8 @@ fn gpu_orthographic_views() {
 /// The camera with clipping planes that cut what it sees: at these shares of the depth of the scene's bounds.
 fn clipped(scene: &Scene, camera: &Camera, [near, far]: [f64; 2]) -> Camera {
     let (lo, hi) = scene.bounds().unwrap();
-    let corner = |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    let corner =
+        |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
     let depths: Vec<f64> = (0..8).map(|k| -camera.camera_to_world.inverse().transform_point3(corner(k)).z).collect();
     let (least, most) = depths.iter().fold((f64::INFINITY, 0.0f64), |(l, m), &d| (l.min(d.max(0.0)), m.max(d)));
     let at = |share: f64| if share.is_finite() { least + share * (most - least) } else { share };
@@ -264,7 +286,10 @@ fn gpu_clipping_planes() {
                     let p = Vec3::from_array(pixel.position).as_dvec3() + scene.origin();
                     let depth = -to_camera.transform_point3(p).z;
                     let ClipPlanes { near, far } = camera.clip;
-                    assert!(depth >= near - 1e-2 && depth <= far + 1e-2, "{name}, {planes:?}: {depth} of {near} to {far}");
+                    assert!(
+                        depth >= near - 1e-2 && depth <= far + 1e-2,
+                        "{name}, {planes:?}: {depth} of {near} to {far}"
+                    );
                 }
             }
         }
@@ -289,7 +314,10 @@ fn mirrored() -> Scene {
     );
     add(shapes::icosphere(0.3, 2), &[place(DVec3::new(1.0, -1.0, 0.8), 0.3, 0.4, 1.0)]);
     add(shapes::sphere(DVec3::new(0.1, 0.0, 0.0), 0.3), &[place(DVec3::new(-1.5, 0.6, 1.0), 0.9, 1.2, 1.0)]);
-    add(shapes::sphere(DVec3::ZERO, 0.2), &[place(DVec3::splat(1.2), 0.2, 0.0, 1.8), place(DVec3::splat(-0.7), 0.2, 0.7, 1.8)]);
+    add(
+        shapes::sphere(DVec3::ZERO, 0.2),
+        &[place(DVec3::splat(1.2), 0.2, 0.0, 1.8), place(DVec3::splat(-0.7), 0.2, 0.7, 1.8)],
+    );
     scene
 }
 
@@ -433,7 +461,11 @@ fn gpu_rasterized_scenes_follow_updates() {
         };
         let changes = Changes {
             instances: motion.instances.iter().map(|&i| (i, scene.instances[i].object_to_world)).collect(),
-            meshes: motion.meshes.iter().map(|&mesh| MeshChange { mesh, positions: positions(mesh), normals: None }).collect(),
+            meshes: motion
+                .meshes
+                .iter()
+                .map(|&mesh| MeshChange { mesh, positions: positions(mesh), normals: None })
+                .collect(),
         };
         tracer.update(&changes).unwrap();
         let shot = Shot { scene: &scene, camera: &camera, size: SIZE };
@@ -454,7 +486,8 @@ fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovP
     let params = Buffer::from_slice(device, "block parameters", &[params]).unwrap();
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
     let mut drawn = None;
-    let timings = Commands::new(device).unwrap().run(|r| drawn = Some(raster.record(r, tracer, &push, view).unwrap())).unwrap();
+    let timings =
+        Commands::new(device).unwrap().run(|r| drawn = Some(raster.record(r, tracer, &push, view).unwrap())).unwrap();
     assert!(timings.is_empty() || timings.iter().map(|t| t.label).eq(["raster draw", "aov"]), "{timings:?}");
     let mut out = vec![AovPixel::zeroed(); count as usize];
     let bytes = target.read(0, 64 * count as u64).unwrap();
@@ -503,7 +536,8 @@ fn gpu_geometry_outside_the_view_is_not_rasterized() {
     // triangles of a pixel and less
     shot.check("a quarter of a terrain", &tracer, Bounds { ids: 0.01, normal: 1e-2, ..BOUNDS });
     let raster = Raster::new(&tracer, &shaders::AOV_CLOSEST, SIZE).unwrap();
-    let view = View { camera: shot.record(), image_size: SIZE, block: Block { origin: [0, 0], size: SIZE }, at: [0.5; 2] };
+    let view =
+        View { camera: shot.record(), image_size: SIZE, block: Block { origin: [0, 0], size: SIZE }, at: [0.5; 2] };
     let (_, drawn) = draw(&raster, &tracer, &view, &view);
     println!("{drawn:?}");
     assert_eq!(drawn.placed, FlatScene::new(&scene).primitive_count() as u64);

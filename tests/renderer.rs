@@ -44,8 +44,9 @@ fn gpu_one_renderer_makes_the_images_of_many() {
         let mut shared = Renderer::new(device.clone(), scene(), &choice(kind)).unwrap();
         for integrator in ["ao", "path", "ao", "normals", "path"] {
             let image = shared.still(&small(integrator), &mut NoControl).unwrap().image;
-            let alone =
-                Renderer::new(device.clone(), scene(), &choice(kind)).unwrap().still(&small(integrator), &mut NoControl);
+            let alone = Renderer::new(device.clone(), scene(), &choice(kind))
+                .unwrap()
+                .still(&small(integrator), &mut NoControl);
             assert!(bits(&image) == bits(&alone.unwrap().image), "{kind}: {integrator}");
             assert_eq!(image.metadata("integrator"), Some(integrator));
         }
@@ -148,7 +149,10 @@ fn gpu_frames_are_antialiased() {
                 (error / (96.0 * 54.0)).sqrt()
             });
             // measured at 320x180: 0.64 and 0.81 (docs/realtime.md)
-            assert!(on < 0.9 * off && on == default, "{kind}, {timeline}: RMSE {off} without, {on} with, {default} by default");
+            assert!(
+                on < 0.9 * off && on == default,
+                "{kind}, {timeline}: RMSE {off} without, {on} with, {default} by default"
+            );
         }
     }
     assert_validation_clean(&device);
@@ -225,7 +229,8 @@ fn settings_are_files() {
     assert_eq!(text["integrators"]["path"], json["integrators"]["path"]);
     assert_eq!(settings(text), wanted);
     assert!(serde_json::from_str::<RenderSettings>(r#"{"image":{"sppp":3}}"#).is_err());
-    let refused = settings(serde_json::json!({ "integrator": "direct", "integrators": { "path": { "max_depth": 3 } } }));
+    let refused =
+        settings(serde_json::json!({ "integrator": "direct", "integrators": { "path": { "max_depth": 3 } } }));
     let text = refused.check().unwrap_err().to_string();
     assert!(text.contains("--max-depth has no effect on --integrator direct"), "{text}");
 }
@@ -241,7 +246,9 @@ fn still(renderer: &mut Renderer, json: serde_json::Value) -> (f64, String, Stri
 fn gpu_the_scene_decides_what_settings_leave_open() {
     let device = device();
     let image = || serde_json::json!({ "size": [40, 30], "spp": 8 });
-    let open = |name: &str| Renderer::new(device.clone(), builtin::by_name(name).unwrap(), &DeviceSettings::default()).unwrap();
+    let open = |name: &str| {
+        Renderer::new(device.clone(), builtin::by_name(name).unwrap(), &DeviceSettings::default()).unwrap()
+    };
 
     // a closed room has a radius by itself, and is black without
     let mut room = open("closed-box");
@@ -252,8 +259,7 @@ fn gpu_the_scene_decides_what_settings_leave_open() {
     );
     let radius: f64 = chosen.metadata("ao.radius").unwrap().parse().unwrap();
     assert!(choices.contains(&format!("AO radius: {radius} ")), "{choices}");
-    let ao =
-        |radius: serde_json::Value| serde_json::json!({ "image": image(), "integrators": { "ao": { "ao_radius": radius } } });
+    let ao = |radius: serde_json::Value| serde_json::json!({ "image": image(), "integrators": { "ao": { "ao_radius": radius } } });
     let (mean, choices, warnings, _) = still(&mut room, ao("inf".into()));
     assert!(mean == 0.0 && choices.is_empty() && warnings.contains("--ao-radius auto"), "{mean} {choices} {warnings}");
     let (_, _, _, same) = still(&mut room, ao(radius.into()));
@@ -319,7 +325,8 @@ fn gpu_ambient_occlusion_is_denoised() {
             Samples::U32(_) => panic!("{name} has floats"),
         };
         // that of the first tracer is that of all
-        let reference = reference.get_or_insert_with(|| y(&renderer.still(&ao(512, None), &mut NoControl).unwrap().image, "Y"));
+        let reference =
+            reference.get_or_insert_with(|| y(&renderer.still(&ao(512, None), &mut NoControl).unwrap().image, "Y"));
         let denoised = renderer.still(&ao(16, Some("filter")), &mut NoControl).unwrap();
         let (after, before) = (y(&denoised.image, "Y"), y(&denoised.image, "noisy.Y"));
         let error = |image: &[f32]| {
@@ -353,7 +360,8 @@ fn gpu_dissolve_is_coverage_unless_it_is_set_to_be_glass() {
             let scene = meaning.map_or_else(|| serde_json::json!({}), |m| serde_json::json!({ "mtl_dissolve": m }));
             let image = serde_json::json!({ "size": [4, 4], "spp": 16 });
             let ao = serde_json::json!({ "ao": { "ao_radius": "inf" } });
-            let how = settings(serde_json::json!({ "image": image, "scene": scene, "camera": camera, "integrators": ao }));
+            let how =
+                settings(serde_json::json!({ "image": image, "scene": scene, "camera": camera, "integrators": ao }));
             let image = renderer.still(&how, &mut NoControl).unwrap().image;
             let values = image.f32("Y").unwrap();
             let mean = values.iter().sum::<f32>() / values.len() as f32;

@@ -13,8 +13,8 @@ use skylit::realtime::{Filter, FilterKind, Settings};
 use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use skylit::stress::{
-    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, counters, degenerate, determinism, direct_light, display,
-    hot_pixel, long_runs, sampling, scale, scene, transparency, watertight,
+    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, counters, degenerate, determinism, direct_light,
+    display, hot_pixel, long_runs, sampling, scale, scene, transparency, watertight,
 };
 use skylit::tracer::TracerKind;
 
@@ -196,7 +196,8 @@ fn gpu_stress_catches_a_wrong_triangle() {
 #[test]
 fn gpu_stress_catches_a_wrong_spawn_offset() {
     let setup = setup();
-    let (_, scene, normal, point) = contact::slack_planes().into_iter().find(|p| p.0 == "tilted plane, scale 1e0").unwrap();
+    let (_, scene, normal, point) =
+        contact::slack_planes().into_iter().find(|p| p.0 == "tilted plane, scale 1e0").unwrap();
     let tracer = setup.tracer(TracerKind::Compute, &scene).unwrap();
     let slack = |by: f64| contact::slack(&tracer, &scene, normal, point, by, &mut NoControl).unwrap();
     let (right, wrong) = (slack(1.0), slack(0.0));
@@ -216,10 +217,16 @@ fn gpu_stress_catches_wrong_layers() {
         skylit::integrators::path::PathOptions { samples: SampleSettings::new([16, 16], 512, 3), ..Default::default() };
     let (scene, _) = transparency::layers(60, 0.02);
     let (_, expected) = transparency::layers(64, 0.02);
-    fails(&sampling::check_mean(&setup, TracerKind::Compute, "layers", &scene, &options, expected, 1e-5, &mut watch).unwrap());
+    fails(
+        &sampling::check_mean(&setup, TracerKind::Compute, "layers", &scene, &options, expected, 1e-5, &mut watch)
+            .unwrap(),
+    );
     let hits = |alpha: f32| {
-        transparency::cutout_hits(&setup.tracer(TracerKind::Compute, &transparency::cutout(alpha)).unwrap(), &mut NoControl)
-            .unwrap()
+        transparency::cutout_hits(
+            &setup.tracer(TracerKind::Compute, &transparency::cutout(alpha)).unwrap(),
+            &mut NoControl,
+        )
+        .unwrap()
     };
     assert_eq!((hits(0.5), hits(0.5f32.next_down())), (100, 0));
 }
@@ -360,8 +367,9 @@ fn gpu_stress_catches_a_filter_that_keeps_what_is_dark_by_chance() {
 /// Section 8: filters keep the mean of what few samples meet, in one step or several, and a sheet that is smaller than it is said to be does not.
 #[test]
 fn gpu_stress_catches_a_filter_that_loses_rare_occlusion() {
-    let of =
-        |settings: &Settings, side: f64| hot_pixel::rare_occlusion(&setup(), TracerKind::Compute, settings, side, 8).unwrap();
+    let of = |settings: &Settings, side: f64| {
+        hot_pixel::rare_occlusion(&setup(), TracerKind::Compute, settings, side, 8).unwrap()
+    };
     let with = |settings: &Settings, kind| Settings { filter: Filter { kind, ..settings.filter }, ..*settings };
     for (what, settings) in display::filters() {
         let plain = of(&with(&settings, FilterKind::None), hot_pixel::SHEET);
@@ -439,8 +447,9 @@ fn gpu_stress_catches_a_leak_of_a_scene() {
     let rays = scene::edge_rays(&whole, &oracle, 5000, 7);
     assert_eq!(rays.len(), 5000);
     let setup = setup();
-    let leaks =
-        |scene: &Scene| scene::leaks(&setup.tracer(TracerKind::Compute, scene).unwrap(), &rays, &mut NoControl).unwrap();
+    let leaks = |scene: &Scene| {
+        scene::leaks(&setup.tracer(TracerKind::Compute, scene).unwrap(), &rays, &mut NoControl).unwrap()
+    };
     let mut holed = whole.clone();
     for mesh in &mut holed.meshes {
         if let Geometry::Triangles(mesh) = &mut mesh.geometry {

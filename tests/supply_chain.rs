@@ -28,7 +28,8 @@ fn texts(value: &Value) -> BTreeSet<String> {
 
 /// The tables of an array of deny.toml, each with a reason of more than a word.
 fn reasoned(section: &str, key: &str) -> Vec<Table> {
-    let entries: Vec<Table> = deny(section)[key].as_array().unwrap().iter().map(|e| e.as_table().unwrap().clone()).collect();
+    let entries: Vec<Table> =
+        deny(section)[key].as_array().unwrap().iter().map(|e| e.as_table().unwrap().clone()).collect();
     for entry in &entries {
         assert!(!text(entry, "reason").is_empty(), "{entry:?}: without a reason");
     }
@@ -45,11 +46,13 @@ fn locked(name: &str) -> Vec<Table> {
 fn fuzz_targets_are_locked() {
     let manifest = read("Cargo.toml");
     let needed = |table: &Table| -> Vec<String> {
-        let kinds = ["dependencies", "build-dependencies"].iter().filter_map(|kind| table.get(*kind)?.as_table().cloned());
+        let kinds =
+            ["dependencies", "build-dependencies"].iter().filter_map(|kind| table.get(*kind)?.as_table().cloned());
         let is_optional = |value: &Value| value.get("optional").and_then(Value::as_bool) == Some(true);
         kinds.flatten().filter(|(_, value)| !is_optional(value)).map(|(name, _)| name).collect()
     };
-    let of_targets = manifest["target"].as_table().unwrap().values().flat_map(|table| needed(table.as_table().unwrap()));
+    let of_targets =
+        manifest["target"].as_table().unwrap().values().flat_map(|table| needed(table.as_table().unwrap()));
     let packages = locked("fuzz/Cargo.lock");
     let own = packages.iter().find(|package| text(package, "name") == "skylit").unwrap();
     // a name, with the version where there are several
@@ -74,7 +77,10 @@ fn sources() {
             let (name, source) = (text(&package, "name"), text(&package, "source"));
             match source {
                 "" => assert!(own.contains(&name), "{lock}: {name} has no source"),
-                _ => assert!(allowed.contains(source) && text(&package, "checksum").len() == 64, "{lock}: {name}: {source}"),
+                _ => assert!(
+                    allowed.contains(source) && text(&package, "checksum").len() == 64,
+                    "{lock}: {name}: {source}"
+                ),
             }
         }
     }
@@ -94,7 +100,10 @@ fn versions() {
     }
     for entry in &skipped {
         let (name, version) = entry.split_once('@').unwrap();
-        assert!(versions.get(name).is_some_and(|v| v.len() > 1 && v.iter().any(|v| v == version)), "{entry} is not needed");
+        assert!(
+            versions.get(name).is_some_and(|v| v.len() > 1 && v.iter().any(|v| v == version)),
+            "{entry} is not needed"
+        );
     }
 }
 
@@ -159,12 +168,19 @@ fn allows(expression: &str, allowed: &BTreeSet<String>) -> bool {
 #[test]
 fn expressions_of_licences() {
     let allowed = ["MIT", "Zlib"].map(str::to_owned).into();
-    for good in
-        ["MIT", "MIT/Apache-2.0", "GPL-3.0 OR MIT", "MIT AND Zlib", "(GPL-3.0 OR MIT) AND Zlib", "GPL-3.0 AND MIT OR Zlib"]
-    {
+    for good in [
+        "MIT",
+        "MIT/Apache-2.0",
+        "GPL-3.0 OR MIT",
+        "MIT AND Zlib",
+        "(GPL-3.0 OR MIT) AND Zlib",
+        "GPL-3.0 AND MIT OR Zlib",
+    ] {
         assert!(allows(good, &allowed), "{good}");
     }
-    for bad in ["GPL-3.0", "MIT AND GPL-3.0", "(MIT OR Zlib) AND GPL-3.0", "MIT WITH LLVM-exception", "GPL-3.0/LGPL-3.0"] {
+    for bad in
+        ["GPL-3.0", "MIT AND GPL-3.0", "(MIT OR Zlib) AND GPL-3.0", "MIT WITH LLVM-exception", "GPL-3.0/LGPL-3.0"]
+    {
         assert!(!allows(bad, &allowed), "{bad}");
     }
 }

@@ -67,8 +67,9 @@ fn compare(image: &Estimate, reference: &Reference) -> Result<ZTestVerdict> {
 }
 
 fn report(name: &str, golden: &str, verdicts: Vec<ZTestVerdict>) {
-    let below =
-        |p: fn(&ZTestVerdict) -> f64| RATES.map(|r| verdicts.iter().filter(|v| p(v) < r).count().to_string()).join(" | ");
+    let below = |p: fn(&ZTestVerdict) -> f64| {
+        RATES.map(|r| verdicts.iter().filter(|v| p(v) < r).count().to_string()).join(" | ")
+    };
     println!("{name} | {golden} | {} | {}", verdicts.len(), below(|v| v.p));
     // of each scale: where alarms come from
     println!("  pixels | | | {}", below(|v| v.extremes[0].p));

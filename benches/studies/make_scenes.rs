@@ -128,7 +128,8 @@ fn courtyard() -> Scene {
     let rgba8: Vec<u8> = (0..size).flat_map(|y| (0..size).flat_map(move |x| tile(x, y))).collect();
     let mut instances = vec![Instance { name: "floor".into(), mesh: 0, object_to_world: DAffine3::IDENTITY }];
     let mut block = |name: String, size: DVec3, at: DVec3| {
-        let object_to_world = DAffine3::from_scale_rotation_translation(size, DQuat::IDENTITY, at + DVec3::Y * size.y * 0.5);
+        let object_to_world =
+            DAffine3::from_scale_rotation_translation(size, DQuat::IDENTITY, at + DVec3::Y * size.y * 0.5);
         instances.push(Instance { name, mesh: 1, object_to_world });
     };
     for i in 0..5 {

@@ -28,10 +28,19 @@ use skylit::tracer::{Kernel, Needs, Tracer, TracerKind};
 use skylit::{Error, Result};
 
 /// Scenes of our own: triangles, spheres, both, instances, alpha, and coordinates that single precision does not hold.
-const BUILTIN: [&str; 8] =
-    ["cornell-box", "cornell-spheres", "sphere-over-plane", "spheres:10000", "leaf-cards", "grid:16", "stairs", "far-away"];
+const BUILTIN: [&str; 8] = [
+    "cornell-box",
+    "cornell-spheres",
+    "sphere-over-plane",
+    "spheres:10000",
+    "leaf-cards",
+    "grid:16",
+    "stairs",
+    "far-away",
+];
 /// Scenes of others, where they are.
-const SHARED: [&str; 4] = ["sponza/sponza.glb", "dragon/dragon.glb", "bunny/bunny.glb", "flight_helmet/FlightHelmet.gltf"];
+const SHARED: [&str; 4] =
+    ["sponza/sponza.glb", "dragon/dragon.glb", "bunny/bunny.glb", "flight_helmet/FlightHelmet.gltf"];
 
 #[derive(Parser)]
 struct Arguments {
@@ -102,7 +111,9 @@ fn run(arguments: &Arguments) -> Result<u64> {
     let subjects = subjects(arguments)?;
     let info = &subjects[0].device.info;
     println!("{} ({}), subgroups of {}\n", info.name, info.driver, info.limits.subgroup_size);
-    println!("| scene | subject | rays | hits | ties | unexplained: nearest, any, weights |\n|---|---|---|---|---|---|");
+    println!(
+        "| scene | subject | rays | hits | ties | unexplained: nearest, any, weights |\n|---|---|---|---|---|---|"
+    );
     let mut totals = vec![Tally::default(); subjects.len()];
     let names = scenes(arguments);
     for name in &names {
@@ -168,7 +179,8 @@ fn scenes(arguments: &Arguments) -> Vec<String> {
     }
     // as `skylit bench` looks for them
     let folder = std::env::var_os("SKYLIT_SHARED_SCENES").map_or_else(|| "../shared/scenes".into(), PathBuf::from);
-    let shared = SHARED.iter().map(|s| folder.join(s)).filter(|p| p.is_file()).map(|p| p.to_string_lossy().into_owned());
+    let shared =
+        SHARED.iter().map(|s| folder.join(s)).filter(|p| p.is_file()).map(|p| p.to_string_lossy().into_owned());
     BUILTIN.iter().map(|s| (*s).to_owned()).chain(shared).collect()
 }
 

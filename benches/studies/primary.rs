@@ -35,7 +35,10 @@ fn main() -> skylit::Result<()> {
         scenes = SCENES.map(str::to_owned).to_vec();
     }
     let device = Device::open(&Options::default())?;
-    println!("{} ({}), medians of {repeats}, milliseconds from recording to the end", device.info.name, device.info.driver);
+    println!(
+        "{} ({}), medians of {repeats}, milliseconds from recording to the end",
+        device.info.name, device.info.driver
+    );
     println!(
         "{:28} {:>10} {:>9} {:>9} {:>9} {:>9} {:>12} {:>6}",
         "scene", "image", "traced", "drawn", "its draw", "its hits", "primitives", "draws"
@@ -43,10 +46,14 @@ fn main() -> skylit::Result<()> {
     for given in &scenes {
         let (name, camera) = given.split_once('@').map_or((given.as_str(), None), |(n, c)| (n, Some(c)));
         let scene = open(name)?;
-        let choice = match camera.map(|c| c.split(',').filter_map(|x| x.parse().ok()).collect::<Vec<f64>>()).as_deref() {
-            Some(&[a, b, c, d, e, f, fov]) => {
-                Choice::LookAt { eye: DVec3::new(a, b, c), target: DVec3::new(d, e, f), up: DVec3::Y, fov_y: fov.to_radians() }
-            }
+        let choice = match camera.map(|c| c.split(',').filter_map(|x| x.parse().ok()).collect::<Vec<f64>>()).as_deref()
+        {
+            Some(&[a, b, c, d, e, f, fov]) => Choice::LookAt {
+                eye: DVec3::new(a, b, c),
+                target: DVec3::new(d, e, f),
+                up: DVec3::Y,
+                fov_y: fov.to_radians(),
+            },
             _ => Choice::Auto,
         };
         let flat = FlatScene::new(&scene);
@@ -65,7 +72,14 @@ fn open(name: &str) -> skylit::Result<Scene> {
     }
 }
 
-fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u32; 2], repeats: usize) -> skylit::Result<()> {
+fn measure(
+    tracer: &Tracer,
+    scene: &Scene,
+    name: &str,
+    choice: &Choice,
+    size: [u32; 2],
+    repeats: usize,
+) -> skylit::Result<()> {
     let device = tracer.device();
     let aspect = size[0] as f64 / size[1] as f64;
     let camera = CameraRecord::new(&choose(scene, choice, aspect)?, scene.origin(), aspect);

@@ -80,7 +80,8 @@ struct Arguments {
 }
 
 fn vector(text: &str) -> std::result::Result<DVec3, String> {
-    let parts: Option<Vec<f64>> = text.split(',').map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let parts: Option<Vec<f64>> =
+        text.split(',').map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     parts
         .and_then(|p| <[f64; 3]>::try_from(p).ok())
         .map(DVec3::from)
@@ -149,8 +150,10 @@ fn streams(device: &Arc<Device>, flat: &FlatScene, arguments: &Arguments) -> Res
     };
     let camera = CameraRecord::new(&camera::choose(flat.scene, &choice, aspect)?, flat.origin, aspect);
     let tracer = Tracer::new(device, TracerKind::Compute, flat, Needs::default())?;
-    let options =
-        AoOptions { samples: SampleSettings { keep_rays: true, ..SampleSettings::new(size, 1, 0) }, ..Default::default() };
+    let options = AoOptions {
+        samples: SampleSettings { keep_rays: true, ..SampleSettings::new(size, 1, 0) },
+        ..Default::default()
+    };
     let kept = ao::render(&tracer, &camera, &options, &mut NoControl)?;
     let bounce: Vec<_> = kept.kept_occlusion.into_iter().filter(|r| r.tmax > r.tmin).collect();
     Ok([
@@ -187,7 +190,13 @@ fn measure(tracers: &[Tracer], streams: &[RayStream], limits: &[usize], rounds: 
     Ok(seconds.into_iter().map(|v| v.iter().map(|s| median(s).unwrap_or(f64::NAN)).collect()).collect())
 }
 
-fn orders(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStream; 3], arguments: &Arguments) -> Result<()> {
+fn orders(
+    device: &Arc<Device>,
+    flat: &FlatScene,
+    label: &str,
+    streams: &[RayStream; 3],
+    arguments: &Arguments,
+) -> Result<()> {
     let primitives = flat.primitive_count();
     let mut kernels = vec![Kernel::Nearest, Kernel::Direction, Kernel::Wide];
     if Kernel::brute_tests(flat) <= Kernel::MAX_BRUTE_TESTS {
@@ -245,7 +254,13 @@ fn orders(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStr
 /// Both triangle tests.
 const TESTS: [TriangleTest; 2] = [TriangleTest::Watertight, TriangleTest::MollerTrumbore];
 
-fn tests(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStream; 3], arguments: &Arguments) -> Result<()> {
+fn tests(
+    device: &Arc<Device>,
+    flat: &FlatScene,
+    label: &str,
+    streams: &[RayStream; 3],
+    arguments: &Arguments,
+) -> Result<()> {
     let variants: Vec<_> = [Kernel::Wide, Kernel::Nearest]
         .into_iter()
         .flat_map(|kernel| TESTS.map(|triangle_test| ComputeOptions { kernel, triangle_test }))

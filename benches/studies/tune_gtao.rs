@@ -58,7 +58,10 @@ fn main() -> Result<()> {
     let arguments = arguments()?;
     let device = Device::open(&Options::default())?;
     let tuner = |scenes: &[String]| Tuner::new(&device, scenes, &arguments);
-    println!("{} ({}), {}x{}, frame {FRAMES}", device.info.name, device.info.driver, arguments.size[0], arguments.size[1]);
+    println!(
+        "{} ({}), {}x{}, frame {FRAMES}",
+        device.info.name, device.info.driver, arguments.size[0], arguments.size[1]
+    );
     let fitted = tuner(&arguments.scenes)?;
     let checked = tuner(&arguments.checks)?;
     let constants = fitted.fit()?;
@@ -116,7 +119,8 @@ impl Tuner {
             let camera = CameraRecord::new(&orbit.camera_at(&camera, 15.0 * f64::from(turn)), scene.origin(), aspect);
             for radius in RADII.map(|r| r * diagonal) {
                 for (radius, falloff) in [(radius, 1.0), (f64::INFINITY, 1000f64.powf(1.0 / radius))] {
-                    let settings = Settings { radius, falloff, primary: Some(Primary::Traced), ..Preset::Balanced.settings() };
+                    let settings =
+                        Settings { radius, falloff, primary: Some(Primary::Traced), ..Preset::Balanced.settings() };
                     self.add_view(camera, settings, arguments.rays)?;
                 }
             }
@@ -128,7 +132,8 @@ impl Tuner {
         let scene = self.tracers.len() - 1;
         let tracer = &self.tracers[scene].1;
         let Settings { radius, falloff, primary, .. } = settings;
-        let truth = Settings { radius, falloff, primary, rays_per_pixel: rays, seed: 77, ..Preset::Reference.settings() };
+        let truth =
+            Settings { radius, falloff, primary, rays_per_pixel: rays, seed: 77, ..Preset::Reference.settings() };
         let mut realtime = Realtime::new(tracer, self.size, &truth, &[])?;
         realtime.frame(tracer, &camera, &[])?;
         let (reference, coverage) = (realtime.result()?, realtime.coverage()?);

@@ -89,8 +89,11 @@ pub fn obj(folder: &Path, data: &[u8]) -> bool {
 /// A library of materials, which never hides the model.
 pub fn mtl(folder: &Path, data: &[u8]) -> bool {
     write(folder, "a.mtl", data);
-    let path =
-        write(folder, "b.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n");
+    let path = write(
+        folder,
+        "b.obj",
+        b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n",
+    );
     let scene = load_file(&path).unwrap();
     assert_eq!(scene.triangle_count(), 1);
     // the texture that seeds name is not there

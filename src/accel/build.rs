@@ -99,7 +99,8 @@ fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
         let boxes: Vec<Aabb> = boxes.par_iter().map(grow).collect();
         return limit_depth(clustered(&boxes), MAX_DEPTH);
     }
-    let mut items: Vec<sah::Item> = boxes.par_iter().enumerate().map(|(i, b)| sah::Item::new(grow(b), i as u32)).collect();
+    let mut items: Vec<sah::Item> =
+        boxes.par_iter().enumerate().map(|(i, b)| sah::Item::new(grow(b), i as u32)).collect();
     let nodes = sah::tree(&mut items);
     drop(items);
     finish(nodes, boxes.len(), preset)
@@ -118,9 +119,11 @@ fn are_uneven(boxes: &[Aabb]) -> bool {
 
 fn clustered(boxes: &[Aabb]) -> Bvh2 {
     let config = obvhs::BvhBuildParams::medium_build();
-    let (distance, precision, threshold) = (config.ploc_search_distance, config.sort_precision, config.search_depth_threshold);
+    let (distance, precision, threshold) =
+        (config.ploc_search_distance, config.sort_precision, config.search_depth_threshold);
     let indices = (0..boxes.len() as u32).collect();
-    let mut tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
+    let mut tree =
+        obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
     obvhs::bvh2::reinsertion::ReinsertionOptimizer::default().run(&mut tree, config.reinsertion_batch_ratio, None);
     // needed by obvhs only
     tree.parents = Vec::new();
@@ -219,7 +222,9 @@ fn is_covered(t: [Vec3; 3], parts: &[Aabb]) -> bool {
     (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |k| (i, k))).all(|(i, k)| {
         let [u, v] = [i, k].map(|x| x as f64 / STEPS as f64);
         let p = a + (b - a) * u + (c - a) * v;
-        parts.iter().any(|part| part.min.as_dvec3().cmple(p + slack).all() && part.max.as_dvec3().cmpge(p - slack).all())
+        parts
+            .iter()
+            .any(|part| part.min.as_dvec3().cmple(p + slack).all() && part.max.as_dvec3().cmpge(p - slack).all())
     })
 }
 
@@ -406,7 +411,8 @@ mod tests {
                 for preset in PRESETS {
                     let what = format!("{n} boxes at scale {scale}, offset {offset}, {preset:?}");
                     validate(&tree(&boxes, preset, None), &boxes, None).unwrap_or_else(|e| panic!("{what}: {e}"));
-                    validate(&tree(&boxes, preset, Some(4)), &boxes, None).unwrap_or_else(|e| panic!("{what}, collapsed: {e}"));
+                    validate(&tree(&boxes, preset, Some(4)), &boxes, None)
+                        .unwrap_or_else(|e| panic!("{what}, collapsed: {e}"));
                     let split = tree_with_splits(&boxes, &each, preset, 4.0 * f32::EPSILON * reach);
                     validate(&split, &boxes, Some(&each)).unwrap_or_else(|e| panic!("{what}, split: {e}"));
                 }
@@ -418,7 +424,8 @@ mod tests {
     #[test]
     fn equal_boxes_are_halved() {
         for n in [2, 3, 1000, 50_000] {
-            let boxes: Vec<Aabb> = (0..n).map(|i| Aabb { min: Vec3::splat((i % 3) as f32), max: Vec3::splat(4.0) }).collect();
+            let boxes: Vec<Aabb> =
+                (0..n).map(|i| Aabb { min: Vec3::splat((i % 3) as f32), max: Vec3::splat(4.0) }).collect();
             for preset in PRESETS {
                 validate(&tree(&boxes, preset, None), &boxes, None).unwrap();
             }
@@ -438,7 +445,8 @@ mod tests {
             .collect();
         let boxes: Vec<Aabb> = t.iter().map(|t| Aabb::of_points(t)).collect();
         let each = |p: u32, see: &mut dyn FnMut([Vec3; 3])| see(t[p as usize]);
-        let (without, with) = (tree(&boxes, BuildPreset::Best, None), tree_with_splits(&boxes, &each, BuildPreset::Best, 0.0));
+        let (without, with) =
+            (tree(&boxes, BuildPreset::Best, None), tree_with_splits(&boxes, &each, BuildPreset::Best, 0.0));
         validate(&with, &boxes, Some(&each)).unwrap();
         assert!(with.nodes.len() > without.nodes.len() && with.nodes.len() <= 2 * (500 + 150), "{}", with.nodes.len());
         assert!(cost(&with) < 0.9 * cost(&without), "{} {}", cost(&with), cost(&without));

@@ -49,7 +49,8 @@ pub fn leaf_range(reference: u32) -> Option<(u32, u32)> {
 /// Splits a reference to an inner node into its number and the axis (0, 1, 2) along which its
 /// children lie apart.
 pub fn inner_node(reference: u32) -> Option<(u32, usize)> {
-    (reference & LEAF == 0 && reference != EMPTY).then_some((reference & NODE_NUMBER, (reference >> AXIS_SHIFT) as usize))
+    (reference & LEAF == 0 && reference != EMPTY)
+        .then_some((reference & NODE_NUMBER, (reference >> AXIS_SHIFT) as usize))
 }
 
 /// The axis along which the centres of two boxes lie farthest apart, and whether the first box is
@@ -86,7 +87,8 @@ impl Bvh2 {
 
     /// Lays a tree out depth first.
     fn lay_out(tree: obvhs::bvh2::Bvh2) -> Self {
-        let mut out = Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
+        let mut out =
+            Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
         // what to emit, its depth, and the node and side that will refer to it
         let mut work = vec![(0usize, 0u32, None::<(usize, usize)>)];
         while let Some((at, depth, parent)) = work.pop() {
@@ -100,7 +102,11 @@ impl Bvh2 {
                 let (axis, swap) = split_axis(&bounds(first), &bounds(first + 1));
                 let (lower, upper) = if swap { (first + 1, first) } else { (first, first + 1) };
                 let corners = |k: usize| [tree.nodes[k].min.to_array(), tree.nodes[k].max.to_array()];
-                out.nodes.push(BinaryNode { boxes: [corners(lower), corners(upper)], children: [0; 2], reserved: [0; 2] });
+                out.nodes.push(BinaryNode {
+                    boxes: [corners(lower), corners(upper)],
+                    children: [0; 2],
+                    reserved: [0; 2],
+                });
                 work.push((upper, depth + 1, Some((index, 1))));
                 work.push((lower, depth + 1, Some((index, 0))));
                 axis << AXIS_SHIFT | index as u32

@@ -124,7 +124,10 @@ impl Cache {
 
     /// Says that what was loaded for a key is not what it should be, and what is wrong with it.
     pub fn reject(&self, key: Key, defect: &str) {
-        self.warn(format!("{}: not the hierarchy of this geometry ({defect}); rebuilding it", self.path(key).display()));
+        self.warn(format!(
+            "{}: not the hierarchy of this geometry ({defect}); rebuilding it",
+            self.path(key).display()
+        ));
     }
 
     /// Stores arrays under a key, replacing an existing file. A failure becomes a warning.
@@ -269,9 +272,11 @@ mod tests {
     /// A head that fits a body full of nonsense numbers.
     #[test]
     fn a_well_signed_table_is_not_trusted() {
-        for body in
-            [vec![0xff; 8], [1u64.to_le_bytes().to_vec(), vec![1, b'x'], u64::MAX.to_le_bytes().to_vec()].concat(), vec![]]
-        {
+        for body in [
+            vec![0xff; 8],
+            [1u64.to_le_bytes().to_vec(), vec![1, b'x'], u64::MAX.to_le_bytes().to_vec()].concat(),
+            vec![],
+        ] {
             let length = (HEAD + body.len()) as u64;
             let sum = xxh3_128(&body).to_le_bytes();
             assert!(parse([&MAGIC[..], &length.to_le_bytes(), &sum, &body].concat()).is_none(), "{body:?}");

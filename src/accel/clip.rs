@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn parts_hold_the_whole() {
         let mut next = numbers();
-        for (scale, offset) in [(1.0f32, 0.0f32), (1e-6, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, -1e5), (1e-20, 0.0), (1e15, 0.0)]
+        for (scale, offset) in
+            [(1.0f32, 0.0f32), (1e-6, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, -1e5), (1e-20, 0.0), (1e15, 0.0)]
         {
             for _ in 0..2000 {
                 let mut point = || Vec3::new(next(), next(), next() * 0.01) * scale + offset;
@@ -142,7 +143,8 @@ mod tests {
                     let [a, b, c] = t.map(Vec3::as_dvec3);
                     let p = a + (b - a) * u + (c - a) * v;
                     let inside = |b: &Aabb| {
-                        b.min.as_dvec3().cmple(p + 1e-14 * p.abs()).all() && b.max.as_dvec3().cmpge(p - 1e-14 * p.abs()).all()
+                        b.min.as_dvec3().cmple(p + 1e-14 * p.abs()).all()
+                            && b.max.as_dvec3().cmpge(p - 1e-14 * p.abs()).all()
                     };
                     assert!(parts.iter().flatten().any(inside), "{p} of {t:?} cut at {at} on axis {axis}: {parts:?}");
                 }
@@ -153,8 +155,9 @@ mod tests {
     /// Cutting is worth it: each half of a diagonal is a quarter of the box.
     #[test]
     fn parts_are_tight() {
-        let triangles =
-            |_: u32, see: &mut dyn FnMut([Vec3; 3])| see([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)]);
+        let triangles = |_: u32, see: &mut dyn FnMut([Vec3; 3])| {
+            see([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)])
+        };
         let cell = Aabb { min: Vec3::ZERO, max: Vec3::new(0.5, 1.0, 1.0) };
         let part = clip(0, cell, &triangles).unwrap();
         assert!((part.max - Vec3::new(0.5, 0.5, 0.0005)).abs().max_element() < 1e-6, "{part:?}");

@@ -54,11 +54,13 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
             let (mut lo, mut hi) = (material.base_color.w, material.base_color.w);
             if let Geometry::Triangles(t) = &mesh.geometry {
                 if let Some(slot) = &material.base_color_texture {
-                    let (a, b) = *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].texels));
+                    let (a, b) =
+                        *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].texels));
                     (lo, hi) = (lo * a, hi * b);
                 }
                 if !t.colors.is_empty() {
-                    let (a, b) = t.colors.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), c| (a.min(c.w), b.max(c.w)));
+                    let (a, b) =
+                        t.colors.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), c| (a.min(c.w), b.max(c.w)));
                     (lo, hi) = (lo * a, hi * b);
                 }
             }
@@ -136,7 +138,8 @@ impl SceneFeatures {
                     .to_owned(),
             );
         } else {
-            let (all, opaque) = flat.groups.iter().fold((0, 0), |(a, o), g| (a + g.primitive_count, o + g.opaque_count));
+            let (all, opaque) =
+                flat.groups.iter().fold((0, 0), |(a, o), g| (a + g.primitive_count, o + g.opaque_count));
             lines.push(format!("alpha test on {} of {all} primitives only", all - opaque));
         }
         if !self.spheres {

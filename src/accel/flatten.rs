@@ -133,7 +133,8 @@ impl<'a> FlatScene<'a> {
 
         // in world space: a group of triangles and one of spheres; other meshes have their own
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat = Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
+        let mut flat =
+            Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
         let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
 
@@ -167,7 +168,11 @@ impl<'a> FlatScene<'a> {
 
         // the groups in world space are instances, too
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
-            flat.instances.push(TlasInstance { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
+            flat.instances.push(TlasInstance {
+                group: flat.groups.len(),
+                to_world: DAffine3::IDENTITY,
+                scene_instance: None,
+            });
             flat.groups.push(group);
         }
         flat
@@ -185,8 +190,10 @@ impl<'a> FlatScene<'a> {
 
     /// Does any primitive have stochastic alpha ([`Blend::Stochastic`])?
     pub fn has_stochastic_alpha(&self) -> bool {
-        let covers = |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
-        self.blend == Blend::Stochastic && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
+        let covers =
+            |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
+        self.blend == Blend::Stochastic
+            && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
     }
 
     /// Does the scene have analytic spheres?
@@ -277,7 +284,14 @@ impl BlasGroup {
         Self { spheres, submeshes: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
     }
 
-    fn push(&mut self, scene: &Scene, mesh: usize, scene_instance: Option<usize>, to_group: DAffine3, alpha_tested: bool) {
+    fn push(
+        &mut self,
+        scene: &Scene,
+        mesh: usize,
+        scene_instance: Option<usize>,
+        to_group: DAffine3,
+        alpha_tested: bool,
+    ) {
         let (primitives, vertices) = match &scene.meshes[mesh].geometry {
             Geometry::Triangles(t) => (t.indices.len(), t.positions.len()),
             Geometry::Spheres(s) => (s.len(), 0),

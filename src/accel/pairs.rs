@@ -41,7 +41,12 @@ impl Fan {
         let second = [corners[0], corners[2], corners[3]];
         let place = |v: u32| second.iter().position(|&s| s == v).map(|p| p as u8);
         // a degenerate triangle may repeat a vertex
-        if corners[0] == corners[2] || b.iter().any(|&v| place(v).is_none()) || b[0] == b[1] || b[1] == b[2] || b[2] == b[0] {
+        if corners[0] == corners[2]
+            || b.iter().any(|&v| place(v).is_none())
+            || b[0] == b[1]
+            || b[1] == b[2]
+            || b[2] == b[0]
+        {
             return None;
         }
         let turn = (4 - apex as u8) % 3;
@@ -256,8 +261,8 @@ mod tests {
             seen[*a as usize] += 1;
             if *b != NONE {
                 seen[*b as usize] += 1;
-                let fan =
-                    Fan::from_triangles(triangles[*a as usize], triangles[*b as usize]).expect("a pair without a common edge");
+                let fan = Fan::from_triangles(triangles[*a as usize], triangles[*b as usize])
+                    .expect("a pair without a common edge");
                 assert_eq!(unfolded(&fan), [triangles[*a as usize], triangles[*b as usize]]);
                 let (a, b) = (boxes[*a as usize], boxes[*b as usize]);
                 assert!(a.union(b).half_area() <= 1.21 * (a.half_area() + b.half_area()));
@@ -286,7 +291,8 @@ mod tests {
         let fan: Vec<_> = (2..50).map(|k| [0, 1, k]).collect();
         assert!(check(&fan, &positions) > 0);
         assert_eq!(check(&[[0, 1, 25]; 30], &positions), 0);
-        let broken: Vec<_> = (0..40).flat_map(|k| [[k, k, k], [k, k + 1, k], [k, k + 1, k + 21], [k + 1, k, k]]).collect();
+        let broken: Vec<_> =
+            (0..40).flat_map(|k| [[k, k, k], [k, k + 1, k], [k, k + 1, k + 21], [k + 1, k, k]]).collect();
         check(&broken, &positions);
         assert_eq!(check(&[], &[]), 0);
     }

@@ -314,7 +314,12 @@ mod tests {
     fn large_trees_are_refitted_in_parts() {
         let b = boxes(70_000, 1, 100.0);
         let plan = RefitPlan::new(&tree(&b).blocks, 0);
-        assert!(plan.tasks.len() > 8 && plan.rest.len() < 5000, "{} parts, {} blocks above", plan.tasks.len(), plan.rest.len());
+        assert!(
+            plan.tasks.len() > 8 && plan.rest.len() < 5000,
+            "{} parts, {} blocks above",
+            plan.tasks.len(),
+            plan.rest.len()
+        );
     }
 
     #[test]

@@ -58,8 +58,10 @@ impl<T: Triangles> Builder<'_, T> {
         }
         let bounds = sah::bounds_of(&items).0;
         let h = self.split(items, budget, depth);
-        let (a, b) =
-            rayon::join(|| self.parallel(h.left, h.budgets[0], depth + 1), || self.parallel(h.right, h.budgets[1], depth + 1));
+        let (a, b) = rayon::join(
+            || self.parallel(h.left, h.budgets[0], depth + 1),
+            || self.parallel(h.right, h.budgets[1], depth + 1),
+        );
         let mut out = Vec::with_capacity(1 + a.len() + b.len());
         out.extend([inner(bounds, 1), moved(a[0], 2), moved(b[0], a.len() as u32 + 1)]);
         out.extend(a[1..].iter().map(|&n| moved(n, 2)));

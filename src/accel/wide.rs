@@ -92,7 +92,8 @@ impl WideBvh {
         let bounds = node_box(tree, 0);
         // a single leaf has a node above it
         let blocks = if tree.nodes[0].is_leaf() { 2.0 } else { 1.0 };
-        let mut out = Self { blocks: top.blocks, depth: top.depth, bounds: Some(bounds), sah_cost: (blocks * top.cost) as f64 };
+        let mut out =
+            Self { blocks: top.blocks, depth: top.depth, bounds: Some(bounds), sah_cost: (blocks * top.cost) as f64 };
 
         // the pieces' roots have their places; the rest of each follows
         let mut ends = Vec::with_capacity(pieces.len());

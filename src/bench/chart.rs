@@ -34,7 +34,8 @@ pub fn scene_charts(record: &Record, scene: &str) -> Vec<Chart> {
 
 /// Charts over all scenes: a quantity against the size of the scene, a chart for each part.
 pub fn size_charts(record: &Record) -> Vec<Chart> {
-    let sized = |m: &&Measurement| m.at.as_ref().is_some_and(|at| at.axis == SIZE) && CHARTED.contains(&m.quantity.as_str());
+    let sized =
+        |m: &&Measurement| m.at.as_ref().is_some_and(|at| at.axis == SIZE) && CHARTED.contains(&m.quantity.as_str());
     let all: Vec<&Measurement> = record.measurements.iter().filter(sized).collect();
     let keys = distinct(all.iter().map(|m| (m.part.as_str(), m.title())));
     let chart = |(part, title): &(&str, String)| {
@@ -94,7 +95,8 @@ impl Group<'_> {
     fn levels(&self) -> Vec<Series> {
         let references = self.scalars(quantity::RMSE.name).filter(|m| m.contestant.starts_with(REFERENCE));
         let level = |m: &Measurement| {
-            let end = |x| Point { label: format!("{}'s own error", m.contestant), ..Point::from((x, m.values.middle())) };
+            let end =
+                |x| Point { label: format!("{}'s own error", m.contestant), ..Point::from((x, m.values.middle())) };
             dashed(&format!("{}'s own error", m.contestant), vec![end(1.0 / BEYOND), end(BEYOND)])
         };
         references.map(level).collect()
@@ -105,7 +107,8 @@ impl Group<'_> {
         let mut points: Vec<Point> = Vec::new();
         for time in self.scalars(quantity::FRAME_TIME.name) {
             // if the reference's error dominates, the contestant's own is at most the measured one
-            let [known, measured] = [quantity::CORRECTED, quantity::RMSE].map(|q| self.scalar(&time.contestant, q.name));
+            let [known, measured] =
+                [quantity::CORRECTED, quantity::RMSE].map(|q| self.scalar(&time.contestant, q.name));
             let Some(error) = known.or(measured) else { continue };
             let most = if known.is_some() { "" } else { ": at most this" };
             let name = format!("{}{most}", time.contestant);
@@ -126,7 +129,8 @@ impl Group<'_> {
 
         // plain accumulation in the same times
         let plain = self.scalars(quantity::PLAIN_CORRECTED.name);
-        let plain = plain.filter_map(|m| Some((self.scalar(&m.contestant, "time")?.values.middle(), m.values.middle())));
+        let plain =
+            plain.filter_map(|m| Some((self.scalar(&m.contestant, "time")?.values.middle(), m.values.middle())));
         let mut plain: Vec<Point> = plain.map(Point::from).collect();
         plain.sort_by(|a, b| a.x.total_cmp(&b.x));
         series.extend((!plain.is_empty()).then(|| dashed("plain accumulation", plain)));
@@ -145,8 +149,9 @@ impl Group<'_> {
     /// Time of a contestant at a place along an axis: measured there, or that of so many frames.
     fn time_at<'g>(&'g self, m: &Measurement) -> Option<(f64, Option<[f64; 2]>, &'g str)> {
         let at = m.along()?;
-        let is_there =
-            |t: &&&Measurement| t.quantity == "time" && t.contestant == m.contestant && t.at.as_ref().is_some_and(|p| p == at);
+        let is_there = |t: &&&Measurement| {
+            t.quantity == "time" && t.contestant == m.contestant && t.at.as_ref().is_some_and(|p| p == at)
+        };
         if let Some(time) = self.all.iter().find(is_there) {
             return Some((time.values.middle(), time.values.spread(), &time.unit));
         }

@@ -127,8 +127,9 @@ impl OutputArgs {
     /// Returns the page's address.
     pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
         let plot = self.plot.as_ref().map_or(Ok(()), |path| page::write_plot(path, records));
-        let write =
-            |dir: &PathBuf| report::write(dir, &page::page(records, &command_line())).map(|index| report::address(&index));
+        let write = |dir: &PathBuf| {
+            report::write(dir, &page::page(records, &command_line())).map(|index| report::address(&index))
+        };
         let address = self.html.as_ref().map(write).transpose();
         plot.and(address)
     }

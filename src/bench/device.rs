@@ -64,7 +64,8 @@ impl BenchDevice {
 fn cpu_name() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     // "model name" on x86; boards with other processors say "Hardware" or "Model" at best
-    let value =
-        |key: &str| text.lines().filter_map(|l| l.split_once(':')).find(|(k, _)| k.trim() == key).map(|(_, v)| one_line(v));
+    let value = |key: &str| {
+        text.lines().filter_map(|l| l.split_once(':')).find(|(k, _)| k.trim() == key).map(|(_, v)| one_line(v))
+    };
     ["model name", "Hardware", "Model", "cpu model"].into_iter().find_map(value).unwrap_or_default()
 }

@@ -268,7 +268,9 @@ impl Record {
         ])?;
         for m in &self.measurements {
             let numbers = match m.values {
-                Values::Exact(v) => [v.to_string(), String::new(), String::new(), String::new(), String::new(), "1".into()],
+                Values::Exact(v) => {
+                    [v.to_string(), String::new(), String::new(), String::new(), String::new(), "1".into()]
+                }
                 Values::Repeated(p) => {
                     let [median, p5, p25, p75, p95] = [p.median, p.p5, p.p25, p.p75, p.p95].map(|v| v.to_string());
                     [median, p5, p25, p75, p95, p.count.to_string()]

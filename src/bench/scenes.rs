@@ -142,8 +142,12 @@ impl SceneList {
         let folder = shared_folder();
         let (present, absent): (Vec<PathBuf>, Vec<PathBuf>) =
             scenes.iter().map(|k| folder.join(k.path)).partition(|p| p.is_file());
-        let note = |p: &PathBuf| format!("{}: file not found, skipped (set SKYLIT_SHARED_SCENES to its folder)", p.display());
-        Self { sources: present.iter().map(|p| p.display().to_string()).collect(), notes: absent.iter().map(note).collect() }
+        let note =
+            |p: &PathBuf| format!("{}: file not found, skipped (set SKYLIT_SHARED_SCENES to its folder)", p.display());
+        Self {
+            sources: present.iter().map(|p| p.display().to_string()).collect(),
+            notes: absent.iter().map(note).collect(),
+        }
     }
 
     /// Two lists, one after the other.
@@ -157,7 +161,9 @@ impl SceneList {
 /// Fails for a scene that does not exist, or for a wrong parameter of a built-in one.
 pub fn check_exists(source: &str) -> Result<()> {
     if files::has_extension(Path::new(source), "json") {
-        return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
+        return Err(Error::Usage(format!(
+            "{source}: a JSON file is no scene; to write the record there, use --json={source}"
+        )));
     }
     let made = builtin::exists(source.strip_prefix("builtin:").unwrap_or(source));
     if made || (Path::new(source).exists() && !source.starts_with("builtin:")) {
@@ -216,7 +222,8 @@ mod tests {
         for there in ["plane", "builtin:terrain:1000", "builtin:terrain:100000000"] {
             assert!(check_exists(there).is_ok(), "{there}");
         }
-        for (absent, code) in [("builtin:terrain:1", 64), ("builtin:grid:1000", 64), ("builtin:plane:3", 64), ("terrain:x", 3)]
+        for (absent, code) in
+            [("builtin:terrain:1", 64), ("builtin:grid:1000", 64), ("builtin:plane:3", 64), ("terrain:x", 3)]
         {
             assert_eq!(check_exists(absent).unwrap_err().exit_code(), code, "{absent}");
         }

@@ -32,8 +32,11 @@ pub fn scene_parts(record: &Record, scene: &str) -> Vec<Part> {
             parts.push(table(part, titles, &singles, |m| m.title()));
         }
         for (title, axis) in distinct(curves.iter().filter_map(|m| Some((m.title(), m.along()?.axis.as_str())))) {
-            let own: Vec<&Measurement> =
-                curves.iter().copied().filter(|m| m.title() == title && m.along().is_some_and(|at| at.axis == axis)).collect();
+            let own: Vec<&Measurement> = curves
+                .iter()
+                .copied()
+                .filter(|m| m.title() == title && m.along().is_some_and(|at| at.axis == axis))
+                .collect();
             let place = |m: &Measurement| m.along().map_or_else(String::new, |at| at.value.to_string());
             let places = thinned(distinct(own.iter().map(|m| place(m))));
             parts.push(table(&format!("{part}: {title} by {axis}"), &places, &own, place));
@@ -87,7 +90,9 @@ fn cell(values: &Values) -> Cell {
 pub fn lines(parts: &[Part]) -> Vec<String> {
     let lines_of = |part: &Part| match part {
         Part::Text(text) => vec![format!("  {text}")],
-        Part::Table(table) => table.lines().into_iter().map(|line| format!("  {line}")).chain([String::new()]).collect(),
+        Part::Table(table) => {
+            table.lines().into_iter().map(|line| format!("  {line}")).chain([String::new()]).collect()
+        }
         Part::Chart(_) | Part::Images(_) => Vec::new(),
     };
     parts.iter().flat_map(lines_of).collect()

@@ -25,7 +25,10 @@ pub struct LoadArgs {
 impl LoadArgs {
     /// The options of the loader.
     pub fn options(self) -> LoadOptions<'static> {
-        LoadOptions { confine: if self.confine { Confine::SceneFolder } else { Confine::Nowhere }, ..LoadOptions::default() }
+        LoadOptions {
+            confine: if self.confine { Confine::SceneFolder } else { Confine::Nowhere },
+            ..LoadOptions::default()
+        }
     }
 }
 

@@ -147,7 +147,11 @@ fn parse_rectangle(text: &str) -> Parsed<[u32; 4]> {
     let expected = || "expected X,Y,WIDTH,HEIGHT in pixels, like 10,20,64,48".to_owned();
     let numbers = text.split(',').map(|n| n.trim().parse().map_err(|_| expected())).collect::<Result<Vec<u32>, _>>()?;
     let rectangle: [u32; 4] = numbers.try_into().map_err(|_| expected())?;
-    if rectangle[2] == 0 || rectangle[3] == 0 { Err("a rectangle has at least one pixel".into()) } else { Ok(rectangle) }
+    if rectangle[2] == 0 || rectangle[3] == 0 {
+        Err("a rectangle has at least one pixel".into())
+    } else {
+        Ok(rectangle)
+    }
 }
 
 /// Where an image comes from.
@@ -168,7 +172,8 @@ impl CompareArgs {
     }
 
     fn options(&self) -> CompareOptions {
-        let mask = MaskOptions { covered: self.mask == Mask::Covered, rectangle: self.rectangle, instance: self.instance };
+        let mask =
+            MaskOptions { covered: self.mask == Mask::Covered, rectangle: self.rectangle, instance: self.instance };
         CompareOptions { channels: self.channels.clone(), mask }
     }
 
@@ -200,7 +205,10 @@ impl CompareArgs {
         }
         let shared = self.shared();
         if let (true, Some(setting)) = (words.is_empty(), shared.given().first()) {
-            return Err(Error::Usage(format!("{} is for renders, and all images are files: leave it out", setting.option())));
+            return Err(Error::Usage(format!(
+                "{} is for renders, and all images are files: leave it out",
+                setting.option()
+            )));
         }
         self.device.check()?;
         let mut settings = render::settings(&words, &shared)?;
@@ -322,7 +330,8 @@ fn entries(
     console: Console,
     warnings: &mut Warnings,
 ) -> Result<Vec<Entry>> {
-    let files: Vec<&Path> = sources.iter().filter_map(|s| if let Source::File(p) = s { Some(&**p) } else { None }).collect();
+    let files: Vec<&Path> =
+        sources.iter().filter_map(|s| if let Source::File(p) = s { Some(&**p) } else { None }).collect();
     // a file that is missing is noticed before anything is rendered
     let budget = Budget::default();
     let loaded = files.iter().map(|p| output::load_within(p, &budget)).collect::<Result<Vec<_>>>()?;
@@ -352,7 +361,8 @@ fn entries(
                     progress: ProgressControl { progress: Progress::new(label, &console), keep_partial: false },
                     warnings,
                 };
-                let Rendered { image, frame, choices, without_effect } = render::render(renderer, &settings, &mut control)?;
+                let Rendered { image, frame, choices, without_effect } =
+                    render::render(renderer, &settings, &mut control)?;
                 drop(control);
                 if let Some(folder) = &args.save {
                     output::save(&image, &saved_file(folder, k))?;
@@ -376,7 +386,8 @@ fn entries(
 
     // renders that are equal in every bit are likely a mistake
     for (n, (k, ours)) in rendered.iter().enumerate() {
-        let twin = rendered[..n].iter().find(|(j, theirs)| ours != theirs && is_same(&entries[*k].image, &entries[*j].image));
+        let twin =
+            rendered[..n].iter().find(|(j, theirs)| ours != theirs && is_same(&entries[*k].image, &entries[*j].image));
         if let Some((j, _)) = twin {
             warnings.add(&format!(
                 "{} and {} are the same in every bit: the options in which they differ have no effect on this image",

@@ -233,7 +233,10 @@ fn lines(report: &Report, seconds: f64) -> Vec<String> {
         });
         lines.extend(report.commands.iter().cloned());
     }
-    lines.push(format!("{:.1} s: {:.1} s of rendering, {:.1} s of search", seconds, report.render_seconds, report.fit_seconds));
+    lines.push(format!(
+        "{:.1} s: {:.1} s of rendering, {:.1} s of search",
+        seconds, report.render_seconds, report.fit_seconds
+    ));
     lines
 }
 
@@ -249,13 +252,20 @@ fn fit_lines(fit: &FitRecord) -> Vec<String> {
     ];
     for row in &fit.rows {
         let ambient = row.ambient.iter().map(|c| significant(*c)).collect::<Vec<_>>().join(", ");
-        let line = format!("  {:<42} {:>9}  {:>7.1} %  {ambient}", row.name, significant(row.rmse), 100.0 * row.explained);
+        let line =
+            format!("  {:<42} {:>9}  {:>7.1} %  {ambient}", row.name, significant(row.rmse), 100.0 * row.explained);
         lines.push(line.trim_end().to_owned());
     }
-    lines.push(format!("  best radius {}; error within 5 % for {}", choice_text(&fit.binary), interval(fit.good_radii)));
+    lines.push(format!(
+        "  best radius {}; error within 5 % for {}",
+        choice_text(&fit.binary),
+        interval(fit.good_radii)
+    ));
     lines.push(format!("  best falloff {}", choice_text(&fit.falloff)));
     // none of a sum that noise makes negative
-    if let Some((parts, all)) = fit.parts.as_ref().map(|p| (p, p.transport + p.occlusion + p.cross)).filter(|p| p.1 > 0.0) {
+    if let Some((parts, all)) =
+        fit.parts.as_ref().map(|p| (p, p.transport + p.occlusion + p.cross)).filter(|p| p.1 > 0.0)
+    {
         let share = |x: f64| format!("{:+.0} %", 100.0 * x / all);
         lines.push(format!(
             "  squared error of the best: {} left by ao-sky in place of AO, {} AO against ao-sky, {} both together",
@@ -281,10 +291,16 @@ fn choice_text(choice: &ChoiceRecord) -> String {
         (Some(radius), None) => format!("{}{error}", significant(radius)),
         (None, Some(half)) => {
             let falloff = choice.options();
-            format!("{} (occlusion halves every {}{error})", falloff.trim_start_matches("--ao-falloff "), significant(half))
+            format!(
+                "{} (occlusion halves every {}{error})",
+                falloff.trim_start_matches("--ao-falloff "),
+                significant(half)
+            )
         }
         (None, None) => "unlimited".into(),
-        (Some(radius), Some(half)) => format!("radius {}, occlusion halves every {}", significant(radius), significant(half)),
+        (Some(radius), Some(half)) => {
+            format!("radius {}, occlusion halves every {}", significant(radius), significant(half))
+        }
     }
 }
 

@@ -73,8 +73,10 @@ fn script(shell: Shell) -> String {
         Shell::Bash => (Some(names.clone()), BASH_COLONS.to_owned()),
         Shell::Zsh => (Some(vec![PLACEHOLDER]), String::new()),
         Shell::Fish => {
-            let of_scenes =
-                format!("complete -c skylit -n \"__fish_skylit_using_subcommand {SCENE_COMMANDS}\" -a '{}'\n", names.join(" "));
+            let of_scenes = format!(
+                "complete -c skylit -n \"__fish_skylit_using_subcommand {SCENE_COMMANDS}\" -a '{}'\n",
+                names.join(" ")
+            );
             (None, of_scenes)
         }
         _ => (None, String::new()),

@@ -180,7 +180,8 @@ mod tests {
     #[test]
     fn known_differences() {
         let inf = f32::INFINITY;
-        let (a, b) = (Samples::F32(vec![1.0, 2.0, inf, inf, f32::NAN]), Samples::F32(vec![1.0, 4.0, inf, 1.0, f32::NAN]));
+        let (a, b) =
+            (Samples::F32(vec![1.0, 2.0, inf, inf, f32::NAN]), Samples::F32(vec![1.0, 4.0, inf, 1.0, f32::NAN]));
         let d = compare(&a, &b, &[1.0; 5]).unwrap();
         let n = d.metrics.unwrap();
         assert_eq!((d.pixels, d.differing, d.broken, n.max, n.bias), (2, 1, 1, 2.0, -1.0));
@@ -191,7 +192,9 @@ mod tests {
         assert_eq!((ids.pixels, ids.differing, ids.metrics), (2, 1, None));
         assert_eq!(difference_text(&ids), "differs in 1 of 2 pixels");
         assert_eq!(difference_text(&masked), "equal in all 1 pixels");
-        assert!(difference_text(&d).ends_with("differs in 1 of 2 pixels; NaN or infinite in one of the images: 1 pixels"));
+        assert!(
+            difference_text(&d).ends_with("differs in 1 of 2 pixels; NaN or infinite in one of the images: 1 pixels")
+        );
         let none = compare(&a, &b, &[0.0; 5]).unwrap();
         assert_eq!(difference_text(&none), "no pixel to compare");
     }
@@ -200,10 +203,20 @@ mod tests {
     fn errors_are_said_as_they_are_meant() {
         let line = |rmse, reference_standard_error| {
             let channels = vec!["R".to_owned()];
-            summary(&Comparison { rmse, reference_standard_error, channels, mask_pixels: 1, pixels: 1, ..Default::default() })
+            summary(&Comparison {
+                rmse,
+                reference_standard_error,
+                channels,
+                mask_pixels: 1,
+                pixels: 1,
+                ..Default::default()
+            })
         };
         assert!(line(0.0, None).starts_with("R: rmse 0, over"), "{}", line(0.0, None));
-        assert!(line(0.02, Some(1e-3)).contains("rmse 2.000e-2, bias +0.000e0, standard error of the reference 1.0e-3, over"));
+        assert!(
+            line(0.02, Some(1e-3))
+                .contains("rmse 2.000e-2, bias +0.000e0, standard error of the reference 1.0e-3, over")
+        );
         assert!(line(0.02, Some(3e-2)).contains("so that the true RMSE is at most about as large"));
     }
 

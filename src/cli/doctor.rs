@@ -81,7 +81,10 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
     if l.shader_group_handle_size > 0 {
         line(format!(
             "           group handle {} B, handle alignment {} B, base alignment {} B, scratch alignment {} B",
-            l.shader_group_handle_size, l.shader_group_handle_alignment, l.shader_group_base_alignment, l.scratch_alignment,
+            l.shader_group_handle_size,
+            l.shader_group_handle_alignment,
+            l.shader_group_base_alignment,
+            l.scratch_alignment,
         ));
     }
 

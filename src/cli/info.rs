@@ -115,7 +115,11 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         let mut progress = Progress::new("looking at the scene", &console);
         match on_device(args, scene, &mut progress) {
             Ok((suggestions, on_device)) => {
-                suggestions.lines(&args.scene).iter().chain(&on_device.lines()).try_for_each(|line| console.line(line))?;
+                suggestions
+                    .lines(&args.scene)
+                    .iter()
+                    .chain(&on_device.lines())
+                    .try_for_each(|line| console.line(line))?;
                 record["suggestions"] = json!(suggestions);
                 record["device"] = json!(on_device);
             }
@@ -161,8 +165,11 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     }
 
     // geometry and surfaces
-    let instanced =
-        if i.triangles == i.unique_triangles { String::new() } else { format!(" ({} unique)", grouped(i.unique_triangles)) };
+    let instanced = if i.triangles == i.unique_triangles {
+        String::new()
+    } else {
+        format!(" ({} unique)", grouped(i.unique_triangles))
+    };
     let spheres = if i.spheres > 0 { format!(", {}", counted(i.spheres, "sphere", "spheres")) } else { String::new() };
     add(
         "geometry",
@@ -185,7 +192,10 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         "no open edges".to_owned()
     };
     let dropped = if i.degenerate_triangles > 0 {
-        format!("; {} dropped", counted(i.degenerate_triangles as u64, "degenerate triangle was", "degenerate triangles were"))
+        format!(
+            "; {} dropped",
+            counted(i.degenerate_triangles as u64, "degenerate triangle was", "degenerate triangles were")
+        )
     } else {
         String::new()
     };
@@ -276,14 +286,16 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     path.integrator = Some("path".parse()?);
     let path = renderer.still(&path, &mut Quiet(&mut control))?.report;
     // less than two stops are a matter of taste
-    let stops = |mean: f64| Some((MIDDLE_GREY / mean).log2().round() + 0.0).filter(|s: &f64| s.abs() >= 2.0).unwrap_or(0.0);
+    let stops =
+        |mean: f64| Some((MIDDLE_GREY / mean).log2().round() + 0.0).filter(|s: &f64| s.abs() >= 2.0).unwrap_or(0.0);
     let exposure = path.surface_mean.filter(|m| *m > 0.0).map(stops);
     let mut choices = by_itself.choices;
     choices.extend(lit.choices.into_iter().filter(|c| c.starts_with("light")));
 
     // a few frames, to say how long one takes
     progress.set(3, 4);
-    let mut frames = RenderSettings { scene: args.meaning.clone(), camera: settings.camera.clone(), ..Default::default() };
+    let mut frames =
+        RenderSettings { scene: args.meaning.clone(), camera: settings.camera.clone(), ..Default::default() };
     frames.image.size = Some(FRAME_SIZE);
     frames.frames.preset = Some(crate::realtime::Preset::Balanced);
     frames.frames.warm_up = Some(1);
@@ -341,7 +353,9 @@ impl Suggestions {
         match self.exposure {
             Some(0.0) => lines.push(format!("{:<12}path-traced images need none", "exposure")),
             Some(stops) => lines.push(format!("{:<12}--exposure {stops} for path tracing", "exposure")),
-            None => lines.push(format!("{:<12}path-traced images are black: no light reaches what is in view", "exposure")),
+            None => {
+                lines.push(format!("{:<12}path-traced images are black: no light reaches what is in view", "exposure"))
+            }
         }
         lines.extend(self.choices.iter().map(|c| format!("{:<12}{c}", "by itself")));
         lines.push(format!("{:<12}skylit render {scene} -o ao.png --preset balanced", "try"));

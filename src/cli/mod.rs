@@ -135,7 +135,8 @@ const MAX_THREADS: usize = 1024;
 fn start_threads() -> Result<()> {
     crate::gpu::host_memory::check_room_to_start();
     let requested = std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse::<usize>().ok()).filter(|n| *n > 0);
-    let wanted = requested.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).min(MAX_THREADS);
+    let wanted =
+        requested.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).min(MAX_THREADS);
     let all = wanted + threads::RESERVED;
     let count = match threads::room(all) {
         room if room == all => wanted,
@@ -198,7 +199,8 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
 fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     #[cfg(feature = "viewer")]
     {
-        let has_display = || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|v| !v.is_empty()));
+        let has_display =
+            || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|v| !v.is_empty()));
         let is_view = match arguments.get(1).map(|a| a.to_string_lossy()) {
             None => has_display(),
             Some(first) => !first.starts_with('-') && view::is_scene(&first),
@@ -285,7 +287,9 @@ mod tests {
         for line in ["skylit bench ao --json", "skylit bench report --json a.json", "skylit diff --json a.json b.png"] {
             assert!(prints(line), "{line}");
         }
-        for line in ["skylit bench ao --json a.json scene.glb", "skylit bench rays --json=a.json", "skylit bench ao a.json"] {
+        for line in
+            ["skylit bench ao --json a.json scene.glb", "skylit bench rays --json=a.json", "skylit bench ao a.json"]
+        {
             assert!(!prints(line), "{line}");
         }
     }

@@ -113,8 +113,11 @@ fn read_mesh(args: &RaysArgs) -> Result<Scene> {
 fn read_rays(path: &Path) -> Result<Vec<Ray>> {
     let bytes = files::read(path)?;
     if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
-        let message =
-            format!("{} bytes: expected a non-zero multiple of {} bytes, the size of a ray", bytes.len(), size_of::<Ray>());
+        let message = format!(
+            "{} bytes: expected a non-zero multiple of {} bytes, the size of a ray",
+            bytes.len(),
+            size_of::<Ray>()
+        );
         return Err(Error::input(path, message));
     }
     Ok(bytemuck::pod_collect_to_vec(&bytes))

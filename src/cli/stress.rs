@@ -114,7 +114,8 @@ pub fn run(args: &StressArgs) -> Result<(), Failure> {
         console.line(&format!("report: {}", crate::report::address(&index)))?;
         record["report"] = json!(index);
     }
-    record["sections"] = SECTIONS.iter().map(|s| json!({ "name": s.name, "title": s.title, "about": s.about })).collect();
+    record["sections"] =
+        SECTIONS.iter().map(|s| json!({ "name": s.name, "title": s.title, "about": s.about })).collect();
     console.close(&record, summary.verdict())
 }
 
@@ -158,5 +159,11 @@ fn total(summary: &Summary) -> String {
     ];
     let parts: Vec<_> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
     let checks = summary.checks.len();
-    format!("{checks} checks: {} (on {}, {}, {:.1} s)", parts.join(", "), summary.device, summary.driver, summary.seconds)
+    format!(
+        "{checks} checks: {} (on {}, {}, {:.1} s)",
+        parts.join(", "),
+        summary.device,
+        summary.driver,
+        summary.seconds
+    )
 }

@@ -155,7 +155,9 @@ fn check_outputs(args: &VerifyArgs, manifest: Option<&Manifest>) -> Result<()> {
     // which files scenes refer to is known only later: none of them is XML
     if let Some(path) = args.junit.as_ref().filter(|path| path.is_file()) {
         let mut start = Vec::new();
-        files::open_regular(path).and_then(|file| file.take(64).read_to_end(&mut start)).map_err(|e| Error::read(path, &e))?;
+        files::open_regular(path)
+            .and_then(|file| file.take(64).read_to_end(&mut start))
+            .map_err(|e| Error::read(path, &e))?;
         let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
         if !text.is_empty() && !text.starts_with(b"<") {
             let message = "--junit would replace a file that is not XML: choose another name, or remove it";
@@ -198,7 +200,9 @@ fn suite(args: &VerifyArgs) -> String {
 /// Whatever keeps frames from being judged has one exit code for scripts.
 fn exit_error(error: Error) -> Error {
     match error {
-        Error::Usage(_) | Error::CheckFailed(_) | Error::NotVerified(_) | Error::Interrupted | Error::Output { .. } => error,
+        Error::Usage(_) | Error::CheckFailed(_) | Error::NotVerified(_) | Error::Interrupted | Error::Output { .. } => {
+            error
+        }
         error => Error::NotVerified(error.to_string()),
     }
 }

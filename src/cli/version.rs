@@ -11,7 +11,8 @@ fn short() -> String {
 
 /// Returns the text of `--version`, which has all that a bug report needs.
 pub fn long() -> String {
-    let lines = [("commit", env!("SKYLIT_BUILD_COMMIT").to_owned()), ("features", env!("SKYLIT_BUILD_FEATURES").to_owned())];
+    let lines =
+        [("commit", env!("SKYLIT_BUILD_COMMIT").to_owned()), ("features", env!("SKYLIT_BUILD_FEATURES").to_owned())];
     let lines = lines.into_iter().chain(vulkan().into_iter().map(|line| ("vulkan", line)));
     std::iter::once(short() + "\n").chain(lines.map(|(key, value)| format!("{key:8}  {value}\n"))).collect()
 }
@@ -19,7 +20,9 @@ pub fn long() -> String {
 /// A line for each device, or why there is none.
 fn vulkan() -> Vec<String> {
     match devices() {
-        Ok(devices) if devices.is_empty() => vec!["no device found: install a Vulkan driver (see `skylit doctor`)".into()],
+        Ok(devices) if devices.is_empty() => {
+            vec!["no device found: install a Vulkan driver (see `skylit doctor`)".into()]
+        }
         Ok(devices) => devices.iter().map(device).collect(),
         Err(e) => vec![format!("not available: {e}")],
     }

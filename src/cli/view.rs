@@ -88,7 +88,8 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
         warm_up: s.warm_up,
         ..Default::default()
     };
-    let image = ImageSettings { time_limit: settings.image.time_limit, aov: settings.image.aov.clone(), ..Default::default() };
+    let image =
+        ImageSettings { time_limit: settings.image.time_limit, aov: settings.image.aov.clone(), ..Default::default() };
     match [image.given(), settings.film.given(), frames.given()].concat().first() {
         Some(setting) => Err(Error::Usage(format!(
             "{} has no effect on `skylit view`: leave it out, or use `skylit render`",
@@ -195,13 +196,24 @@ mod tests {
             let args = ["a"].into_iter().chain(line.split_whitespace());
             check_has_effect(&<Alone as clap::Parser>::try_parse_from(args).unwrap().settings)
         };
-        for line in
-            ["--time-limit 3", "--aov depth", "--resume a.exr", "--resumable", "--frames 0..3", "--orbit", "--warm-up 2"]
-        {
+        for line in [
+            "--time-limit 3",
+            "--aov depth",
+            "--resume a.exr",
+            "--resumable",
+            "--frames 0..3",
+            "--orbit",
+            "--warm-up 2",
+        ] {
             let error = check(line).unwrap_err();
-            assert!(error.to_string().starts_with(line.split(' ').next().unwrap()) && error.exit_code() == 64, "{error}");
+            assert!(
+                error.to_string().starts_with(line.split(' ').next().unwrap()) && error.exit_code() == 64,
+                "{error}"
+            );
         }
-        for line in ["", "--size 800x600 --preset fast --show depth", "--integrator path --max-depth 3 --environment 1,1,1"] {
+        for line in
+            ["", "--size 800x600 --preset fast --show depth", "--integrator path --max-depth 3 --environment 1,1,1"]
+        {
             check(line).unwrap();
         }
     }

@@ -82,8 +82,7 @@ mod tests {
 
     #[test]
     fn numbers_of_cameras_are_readable() {
-        let camera =
-            "\"main\" eye [2.7800000000000002, 2.73, -8], forward [0.9737024961747475, -0, 1]; fov_y 59.99999999999999 degrees";
+        let camera = "\"main\" eye [2.7800000000000002, 2.73, -8], forward [0.9737024961747475, -0, 1]; fov_y 59.99999999999999 degrees";
         assert_eq!(readable(camera), "\"main\" eye [2.78, 2.73, -8], forward [0.9737, -0, 1]; fov_y 60 degrees");
         assert_eq!(readable("scene.glb; builtin:grid:1000000"), "scene.glb; builtin:grid:1000000");
     }
@@ -99,7 +98,11 @@ mod tests {
         let b = entry(&[("scene", "x"), ("pixel_filter", "box"), ("tracer", "query")]);
         let set = ImageSet::new(vec![a, b, entry(&[])], 1, &CompareOptions::default()).unwrap();
         assert_eq!(set.warnings.len(), 1);
-        assert!(set.warnings[0].starts_with("A and B differ in their pixel filter (centre; box): "), "{}", set.warnings[0]);
+        assert!(
+            set.warnings[0].starts_with("A and B differ in their pixel filter (centre; box): "),
+            "{}",
+            set.warnings[0]
+        );
         let differing: Vec<_> = differing_metadata(&set).into_iter().map(|e| e.key).collect();
         // the third image has none of them
         assert_eq!(differing, ["pixel_filter", "scene", "spp", "tracer"]);

@@ -9,7 +9,8 @@ use crate::report::{Cell, Column, Page, Part, Row, Section, Table, format_number
 /// A page with the images, their differences and metrics, and metadata in which they differ.
 /// `command`: the command line that was typed.
 pub fn page(set: &ImageSet, command: &str) -> Result<Page> {
-    let names: Vec<String> = set.entries.iter().enumerate().map(|(k, e)| format!("{}: {}", letter(k), e.name)).collect();
+    let names: Vec<String> =
+        set.entries.iter().enumerate().map(|(k, e)| format!("{}: {}", letter(k), e.name)).collect();
     let images: Vec<NamedImage> = (set.entries.iter().zip(&names).zip(&set.comparisons))
         .map(|((entry, name), comparison)| NamedImage {
             name,
@@ -66,7 +67,8 @@ fn facts(set: &ImageSet) -> Vec<(String, String)> {
         facts.push(("channels".into(), c.channels.join(" ")));
         let is_one = set.judged().all(|(_, _, other)| (other.pixels, &other.mask) == (c.pixels, &c.mask));
         let text = |c: &Comparison| format!("{} pixels ({})", c.pixels, c.mask);
-        let of_each = || set.judged().map(|(k, _, c)| format!("{}: {}", letter(k), text(c))).collect::<Vec<_>>().join(", ");
+        let of_each =
+            || set.judged().map(|(k, _, c)| format!("{}: {}", letter(k), text(c))).collect::<Vec<_>>().join(", ");
         facts.push(("compared".into(), if is_one { text(c) } else { of_each() }));
     }
     for key in ["scene", "device", "tracer", "version"] {
@@ -80,8 +82,10 @@ fn facts(set: &ImageSet) -> Vec<(String, String)> {
 fn metadata(set: &ImageSet, names: &[String]) -> Option<Section> {
     let entries = differing_metadata(set);
     let columns = std::iter::once("entry").chain(names.iter().map(String::as_str));
-    let mut table =
-        Table { columns: columns.map(|c| Column { title: c.to_owned(), help: String::new() }).collect(), ..Table::default() };
+    let mut table = Table {
+        columns: columns.map(|c| Column { title: c.to_owned(), help: String::new() }).collect(),
+        ..Table::default()
+    };
     for entry in &entries {
         let cells = entry.values.iter().map(|v| Cell::from(v.as_deref().unwrap_or("-")));
         table.rows.push(Row::new(std::iter::once(Cell::from(&*entry.key)).chain(cells)));
@@ -108,12 +112,14 @@ mod tests {
         let page = page(&set, "skylit compare").unwrap();
         assert_eq!(page.title, "A: ao against B: path");
         assert!(
-            page.summary.starts_with("A has an RMSE of 0.2165, a mean FLIP of ") && page.summary.contains("darker by 0.1875"),
+            page.summary.starts_with("A has an RMSE of 0.2165, a mean FLIP of ")
+                && page.summary.contains("darker by 0.1875"),
             "{}",
             page.summary
         );
         assert!(
-            page.facts.contains(&("scene".into(), "s".into())) && page.facts.contains(&("size".into(), "2x2 pixels".into()))
+            page.facts.contains(&("scene".into(), "s".into()))
+                && page.facts.contains(&("size".into(), "2x2 pixels".into()))
         );
         let titles: Vec<_> = page.sections.iter().map(|s| &*s.title).collect();
         assert_eq!(titles, ["Images", "Metrics", "Differences", "How the images were made, where it differs"]);

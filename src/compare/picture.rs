@@ -76,7 +76,8 @@ fn difference(c: &Comparison, width: u32, caption: &str) -> Result<Picture> {
     let values: Vec<f32> = (0..c.maps.compared.len()).map(value).collect();
     let end = scale(&values, &c.maps.compared);
     let pixels = values.iter().zip(&c.maps.compared);
-    let pixels = pixels.map(|(v, compared)| if *compared > 0.0 || v.is_nan() { palette::signed(v / end) } else { PAPER });
+    let pixels =
+        pixels.map(|(v, compared)| if *compared > 0.0 || v.is_nan() { palette::signed(v / end) } else { PAPER });
     let labels = [format!("-{end}: darker"), "0".into(), format!("+{end}: brighter")];
     with_legend(pixels.collect(), width, caption, &labels, |t| palette::signed(2.0 * t - 1.0))
 }
@@ -192,11 +193,17 @@ mod tests {
             [palette::signed(-1.0), palette::signed(0.0), palette::signed(1.0), PAPER]
         );
         let y = 2 + BAR[1] + 3;
-        assert_eq!([pixel(&p, BAR[0], y), pixel(&p, p.width - BAR[2] - 1, y)], [palette::signed(-1.0), palette::signed(1.0)]);
+        assert_eq!(
+            [pixel(&p, BAR[0], y), pixel(&p, p.width - BAR[2] - 1, y)],
+            [palette::signed(-1.0), palette::signed(1.0)]
+        );
         // there is a caption
         assert!((2..2 + BAR[1]).any(|y| (0..p.width).any(|x| pixel(&p, x, y) != PAPER)));
         let p = flip(&comparison(vec![0.0; 4], vec![0.0, 1.0, f32::NAN, 0.5]), 2, "FLIP").unwrap();
-        assert_eq!([pixel(&p, 0, 0), pixel(&p, 1, 0), pixel(&p, 1, 1)], [palette::heat(0.0), palette::heat(1.0), PAPER]);
+        assert_eq!(
+            [pixel(&p, 0, 0), pixel(&p, 1, 0), pixel(&p, 1, 1)],
+            [palette::heat(0.0), palette::heat(1.0), PAPER]
+        );
         assert!(flip(&comparison(vec![0.0; 4], Vec::new()), 2, "").is_err());
     }
 

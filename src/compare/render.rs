@@ -34,7 +34,9 @@ pub fn settings(words: &[&str], shared: &RenderSettings) -> Result<Vec<RenderSet
         let merged = kept.overridden_by(settings);
         if let (None, Some(made)) = (settings.realtime_setting(), merged.realtime_setting()) {
             let option = made.option();
-            return Err(wrong(format!("{option} makes a still of each frame: say with --spp how many samples each has")));
+            return Err(wrong(format!(
+                "{option} makes a still of each frame: say with --spp how many samples each has"
+            )));
         }
         merged.check().map_err(|e| wrong(e.to_string()))?;
         all.push(merged);
@@ -89,7 +91,12 @@ pub fn render(renderer: &mut Renderer, settings: &RenderSettings, control: &mut 
     }
     if settings.realtime_setting().is_none() {
         let still = renderer.still(settings, control)?;
-        return Ok(Rendered { image: still.image, frame: None, choices: still.report.setup.choices, without_effect: None });
+        return Ok(Rendered {
+            image: still.image,
+            frame: None,
+            choices: still.report.setup.choices,
+            without_effect: None,
+        });
     }
 
     // Renders all frames in real time, of which the last is shown.
@@ -152,7 +159,8 @@ mod tests {
     #[test]
     fn shared_settings_go_where_they_have_an_effect() {
         let shared = RenderSettings::from_words("--size 20x10 --spp 3 --environment 1,1,1 --fov-y 30").unwrap();
-        let [ao, path, frames] = &settings(&["ao --ao-radius 2", "path --spp 9", "balanced"], &shared).unwrap()[..] else {
+        let [ao, path, frames] = &settings(&["ao --ao-radius 2", "path --spp 9", "balanced"], &shared).unwrap()[..]
+        else {
             panic!()
         };
         assert_eq!((ao.image.size, ao.image.spp, ao.lighting.environment.as_deref()), (Some([20, 10]), Some(3), None));
@@ -174,13 +182,16 @@ mod tests {
 
     #[test]
     fn frames_have_what_is_for_frames_and_stills_a_time() {
-        let shared = RenderSettings::from_words("--ao-radius 2 --frames 0..8 --orbit 120 --at-rest hold --spp 4").unwrap();
+        let shared =
+            RenderSettings::from_words("--ao-radius 2 --frames 0..8 --orbit 120 --at-rest hold --spp 4").unwrap();
         let [frames, still] = &settings(&["balanced", "ao"], &shared).unwrap()[..] else { panic!() };
         assert_eq!((frames.integrators.ao.radius(), still.integrators.ao.radius()), (2.0, 2.0));
         assert!(frames.frames.at_rest.is_some() && frames.realtime_setting().is_some() && frames.image.spp.is_none());
         assert!(still.is_still_sequence() && still.frames.orbit == Some(120) && still.frames.at_rest.is_none());
         let shared = RenderSettings::from_words("--frames 0..8").unwrap();
-        assert!(settings(&["balanced", "ao"], &shared).unwrap_err().to_string().contains("\"ao\": --frames makes a still"));
+        assert!(
+            settings(&["balanced", "ao"], &shared).unwrap_err().to_string().contains("\"ao\": --frames makes a still")
+        );
     }
 
     #[test]

@@ -17,7 +17,8 @@ impl ImageSet {
         let mut lines: Vec<String> = Vec::new();
         for (k, entry) in self.entries.iter().enumerate() {
             let role = if k == self.reference { " (reference)" } else { "" };
-            let description = if entry.description.is_empty() { String::new() } else { format!(", {}", entry.description) };
+            let description =
+                if entry.description.is_empty() { String::new() } else { format!(", {}", entry.description) };
             lines.push(format!("{}{role}: {}{description}", letter(k), entry.name));
         }
         lines.extend(self.choices());
@@ -33,7 +34,8 @@ impl ImageSet {
         let widest = |texts: &mut dyn Iterator<Item = &str>| texts.map(|t| t.chars().count()).max().unwrap_or(0) + GAP;
         let all = || judged.iter().flat_map(|(.., m)| m);
         let (first, column) = (widest(&mut all().map(|m| m.name)), widest(&mut all().map(|m| &*m.text)));
-        let padded = |text: &str, width: usize| format!("{text}{}", " ".repeat(width.saturating_sub(text.chars().count())));
+        let padded =
+            |text: &str, width: usize| format!("{text}{}", " ".repeat(width.saturating_sub(text.chars().count())));
         let mut head = padded("", first);
         judged.iter().for_each(|(k, ..)| head += &padded(&letter(*k).to_string(), column));
         lines.push(head.trim_end().to_owned());

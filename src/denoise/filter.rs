@@ -101,7 +101,9 @@ fn has_sharp_reflections(material: &Material) -> bool {
 /// Specular reflectance at normal incidence, independent of the base colour.
 fn specular_albedo(material: &Material) -> f32 {
     match material.kind {
-        MaterialKind::MetallicRoughness => ((material.ior - 1.0) / (material.ior + 1.0)).powi(2) * material.specular.factor,
+        MaterialKind::MetallicRoughness => {
+            ((material.ior - 1.0) / (material.ior + 1.0)).powi(2) * material.specular.factor
+        }
         _ => 0.0,
     }
 }
@@ -120,7 +122,8 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
 
     for k in 0..pixels {
         let (centre, samples, content) = (&features.centres[k], film.samples[k], features.content[k]);
-        let Some(material) = scene.materials.get(centre.material as usize).filter(|_| centre.depth < f32::INFINITY) else {
+        let Some(material) = scene.materials.get(centre.material as usize).filter(|_| centre.depth < f32::INFINITY)
+        else {
             continue;
         };
         let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
@@ -231,8 +234,9 @@ mod tests {
 
     #[test]
     fn what_shows_others_is_left_alone() {
-        let is_sharp =
-            |kind, roughness, metallic| has_sharp_reflections(&Material { kind, roughness, metallic, ..Material::default() });
+        let is_sharp = |kind, roughness, metallic| {
+            has_sharp_reflections(&Material { kind, roughness, metallic, ..Material::default() })
+        };
         assert!(is_sharp(MaterialKind::Mirror, 1.0, 0.0) && is_sharp(MaterialKind::Glass, 1.0, 0.0));
         assert!(is_sharp(MaterialKind::Gold, 0.1, 0.0) && !is_sharp(MaterialKind::Gold, 0.5, 0.0));
         assert!(!is_sharp(MaterialKind::Matte, 0.0, 1.0));

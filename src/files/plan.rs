@@ -145,9 +145,12 @@ impl FilePlan {
             let Some(identity) = Identity::from_path(path) else { continue };
             if let Some((other, same)) = outputs.insert(identity, (option, path)) {
                 let spelled = spelled(path, same);
-                let who = if other == option { format!("{option} is given twice") } else { format!("{other} and {option}") };
-                let message =
-                    format!("{}: two outputs would be one file{spelled} ({who}): give each a name of its own", path.display());
+                let who =
+                    if other == option { format!("{option} is given twice") } else { format!("{other} and {option}") };
+                let message = format!(
+                    "{}: two outputs would be one file{spelled} ({who}): give each a name of its own",
+                    path.display()
+                );
                 return Err(Error::Usage(message));
             }
         }
@@ -220,7 +223,9 @@ mod tests {
             let (code, text) = twice(a, b).unwrap_or_else(|| panic!("{a} {b}"));
             assert!(code == 64 && text.contains("-o and --csv") && !text.contains('\n'), "{text}");
         }
-        for (a, b) in [("a.png", "b.png"), ("old.png", "OLD.png"), ("a.png", "folder/a.png"), ("old.png", "dangling.png")] {
+        for (a, b) in
+            [("a.png", "b.png"), ("old.png", "OLD.png"), ("a.png", "folder/a.png"), ("old.png", "dangling.png")]
+        {
             assert_eq!(twice(a, b), None, "{a} {b}");
         }
         // what is no file is not replaced
@@ -248,7 +253,8 @@ mod tests {
             plan.writes("-o", at(output));
             plan
         };
-        for (output, role) in [("scene.glb", "the scene"), ("link.glb", "the scene"), ("cube/px.png", "--environment")] {
+        for (output, role) in [("scene.glb", "the scene"), ("link.glb", "the scene"), ("cube/px.png", "--environment")]
+        {
             let text = plan(output).check().unwrap_err().to_string();
             assert!(text.contains(&format!("-o would replace {role}")), "{text}");
         }

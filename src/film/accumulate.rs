@@ -401,7 +401,8 @@ impl<E: Estimator> Run<'_, E> {
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
         self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
-        self.out.converged = self.samples.film.target_rmse.map(|target| TileErrors::from_film(&self.out.film).count(target));
+        self.out.converged =
+            self.samples.film.target_rmse.map(|target| TileErrors::from_film(&self.out.film).count(target));
     }
 }
 

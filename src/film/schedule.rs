@@ -133,7 +133,11 @@ mod tests {
         assert_eq!((step.goal, step.tiles), (128, vec![false, false, true, true]));
         // at the end of a run of 100 samples, too
         assert_eq!(
-            FilmOptions { target_rmse: Some(0.1), ..Default::default() }.next(100, &[64, 64, 100, 100], &Film::new(32, 8, 1)),
+            FilmOptions { target_rmse: Some(0.1), ..Default::default() }.next(
+                100,
+                &[64, 64, 100, 100],
+                &Film::new(32, 8, 1)
+            ),
             None
         );
         // the third has turned out to be noisy: the second, which has fewer samples, goes on first
@@ -143,7 +147,10 @@ mod tests {
         assert_eq!((step.goal, step.tiles), (256, vec![false, true, true, true]));
         // all know enough; and those that do not have all there are
         assert_eq!(set([64, 128, 256, 256], [0.16; 4]), None);
-        assert_eq!(set([64, 512, 1024, 1024], [0.16, 0.16, 1e9, 1e9]).map(|s| s.tiles), Some(vec![false, true, false, false]));
+        assert_eq!(
+            set([64, 512, 1024, 1024], [0.16, 0.16, 1e9, 1e9]).map(|s| s.tiles),
+            Some(vec![false, true, false, false])
+        );
         assert_eq!(set([64, 1024, 1024, 1024], [0.16, 0.16, 1e9, 1e9]), None);
     }
 }

@@ -26,7 +26,8 @@ pub struct Word {
 
 /// The words of a record, in order, for channels of these names.
 pub fn words(channels: &[&str]) -> Vec<Word> {
-    let pair = |kind: &str, excess: &str, c: &str| [kind, excess].map(|k| Word { name: format!("{k}.{c}"), float: true });
+    let pair =
+        |kind: &str, excess: &str, c: &str| [kind, excess].map(|k| Word { name: format!("{k}.{c}"), float: true });
     let sums = channels.iter().flat_map(|c| pair("sum", "excess", c));
     let squares = channels.iter().flat_map(|c| pair("squares", "squares_excess", c));
     let counts = ["covered", "not_finite"].map(|n| Word { name: n.into(), float: false });

@@ -88,7 +88,14 @@ impl TileMask {
     }
 }
 
-fn mark_part(flat: &FlatScene, placement: &TlasInstance, group: &BlasGroup, part: &Submesh, view: &View, tiles: &Marks) {
+fn mark_part(
+    flat: &FlatScene,
+    placement: &TlasInstance,
+    group: &BlasGroup,
+    part: &Submesh,
+    view: &View,
+    tiles: &Marks,
+) {
     let to_world = placement.to_world;
     match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(mesh) => {
@@ -140,8 +147,8 @@ impl View {
         let moved = || instances.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
         let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
         let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
-        let coordinates =
-            condition * (bounds.min.abs().max(bounds.max.abs()).max_element() as f64 + column(3).length() + translation);
+        let coordinates = condition
+            * (bounds.min.abs().max(bounds.max.abs()).max_element() as f64 + column(3).length() + translation);
         if !(reach.is_finite() && (view.orthographic || near > 1e-3 * reach)) {
             return None;
         }

@@ -69,8 +69,13 @@ pub struct AccelerationStructure {
 impl AccelerationStructure {
     fn allocate(device: &Arc<Device>, name: &str, ty: vk::AccelerationStructureTypeKHR, size: u64) -> Result<Self> {
         let functions = functions(device)?;
-        let buffer =
-            Buffer::with_usage(device, name, size, Memory::Device, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR)?;
+        let buffer = Buffer::with_usage(
+            device,
+            name,
+            size,
+            Memory::Device,
+            vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR,
+        )?;
         let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(buffer.raw).size(size).ty(ty);
         // SAFETY: the buffer holds `size` bytes; offset 0 is aligned
         let raw = unsafe { functions.create_acceleration_structure(&info, None) }.context(name)?;
@@ -86,7 +91,12 @@ impl AccelerationStructure {
 
     /// Builds a bottom-level structure, and compacts it if that saves memory. On lavapipe it never
     /// does, but the query runs there too, so that tests cover it.
-    pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
+    pub fn bottom_level(
+        device: &Arc<Device>,
+        commands: &mut Commands,
+        name: &str,
+        input: &BottomLevelInput,
+    ) -> Result<Self> {
         let (geometries, ranges) = bottom_level_geometry(input);
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
             | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
@@ -112,7 +122,11 @@ impl AccelerationStructure {
     }
 
     /// Builds a top level.
-    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[AccelerationStructureInstance]) -> Result<Self> {
+    pub fn top_level(
+        device: &Arc<Device>,
+        commands: &mut Commands,
+        entries: &[AccelerationStructureInstance],
+    ) -> Result<Self> {
         let records = entry_records(device, entries)?;
         Inputs::top_level(&records, entries.len()).build(device, commands, "top level")
     }
@@ -260,8 +274,8 @@ struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     fn changing(input: &BottomLevelInput) -> Self {
         let (geometries, ranges) = bottom_level_geometry(input);
-        let flags =
-            vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE | vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE;
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
+            | vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE;
         Self { ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, geometries, ranges }
     }
 
@@ -287,7 +301,10 @@ impl<'a> Inputs<'a> {
             .geometries(&self.geometries)
     }
 
-    fn sizes(&self, functions: &ash::khr::acceleration_structure::Device) -> vk::AccelerationStructureBuildSizesInfoKHR<'_> {
+    fn sizes(
+        &self,
+        functions: &ash::khr::acceleration_structure::Device,
+    ) -> vk::AccelerationStructureBuildSizesInfoKHR<'_> {
         let counts: Vec<u32> = self.ranges.iter().map(|r| r.primitive_count).collect();
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         let info = self.info(vk::BuildAccelerationStructureModeKHR::BUILD);

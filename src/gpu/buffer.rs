@@ -103,7 +103,8 @@ impl Buffer {
         buffer.allocation = Some(allocation);
 
         // SAFETY: created with SHADER_DEVICE_ADDRESS, bound above
-        buffer.address = unsafe { device.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(raw)) };
+        buffer.address =
+            unsafe { device.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(raw)) };
         Ok(buffer)
     }
 

@@ -57,7 +57,8 @@ impl Commands {
         commands.buffer = unsafe { raw.allocate_command_buffers(&info) }.context("the command buffer")?[0];
         commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.context("the fence")?;
         if device.info.limits.timestamp_period > 0.0 {
-            let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_REGIONS);
+            let info =
+                vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_REGIONS);
             commands.queries = Some(unsafe { raw.create_query_pool(&info, None) }.context("the timestamp queries")?);
         }
         Ok(commands)
@@ -76,8 +77,13 @@ impl Commands {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
         }
-        let mut recorder =
-            Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new(), drew: false };
+        let mut recorder = Recorder {
+            device: &self.device,
+            buffer: self.buffer,
+            queries: self.queries,
+            labels: Vec::new(),
+            drew: false,
+        };
         record(&mut recorder);
         recorder.final_barrier();
         let labels = recorder.labels;
@@ -160,7 +166,9 @@ impl Recorder<'_> {
         record(self);
         let (device, buffer) = (self.device, self.buffer);
         // SAFETY: as above
-        unsafe { device.raw.cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, 2 * region + 1) };
+        unsafe {
+            device.raw.cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, 2 * region + 1)
+        };
     }
 
     /// A full memory barrier: commands recorded before it finish, and their writes are visible,
@@ -200,7 +208,9 @@ impl Recorder<'_> {
             .dst_stage_mask(to)
             .dst_access_mask(read)];
         // SAFETY: recording state
-        unsafe { self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
+        unsafe {
+            self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().memory_barriers(&barrier))
+        };
     }
 
     /// Copies bytes between buffers.
@@ -282,7 +292,12 @@ impl Recorder<'_> {
         }
     }
 
-    pub(super) fn push<P: bytemuck::NoUninit>(&self, layout: vk::PipelineLayout, stages: vk::ShaderStageFlags, push: &P) {
+    pub(super) fn push<P: bytemuck::NoUninit>(
+        &self,
+        layout: vk::PipelineLayout,
+        stages: vk::ShaderStageFlags,
+        push: &P,
+    ) {
         let bytes = bytemuck::bytes_of(push);
         assert_eq!(bytes.len() as u32, super::pipeline::PUSH_BYTES);
         // SAFETY: the layout has one range of this size for these stages

@@ -79,11 +79,13 @@ impl Device {
             .synchronization2(true)
             .dynamic_rendering(info.can_rasterise())
             .compute_full_subgroups(info.limits.packets);
-        let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut f_structure =
+            vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
         let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
         let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
         let features = vk::PhysicalDeviceFeatures::default().shader_int64(info.int64);
         let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -93,7 +95,8 @@ impl Device {
 
         // each tracer's extensions are enabled if they are there
         if pipeline || query {
-            extensions.extend([khr::acceleration_structure::NAME.as_ptr(), khr::deferred_host_operations::NAME.as_ptr()]);
+            extensions
+                .extend([khr::acceleration_structure::NAME.as_ptr(), khr::deferred_host_operations::NAME.as_ptr()]);
             create = create.push_next(&mut f_structure);
         }
         if pipeline {
@@ -108,7 +111,8 @@ impl Device {
 
         // SAFETY: the physical device is of this instance; everything enabled was reported as
         // supported
-        let raw = unsafe { instance.raw.create_device(info.physical, &create, None) }.context("opening the Vulkan device")?;
+        let raw =
+            unsafe { instance.raw.create_device(info.physical, &create, None) }.context("opening the Vulkan device")?;
         // SAFETY: the device was created with one queue of this family
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
 
@@ -125,7 +129,8 @@ impl Device {
         let data = cache::load(&info);
         let cache_info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
         // SAFETY: the data's header was checked to be of this device and driver
-        let pipeline_cache = unsafe { raw.create_pipeline_cache(&cache_info, None) }.context("creating the pipeline cache")?;
+        let pipeline_cache =
+            unsafe { raw.create_pipeline_cache(&cache_info, None) }.context("creating the pipeline cache")?;
         Ok(Arc::new(Self {
             structures: (pipeline || query).then(|| khr::acceleration_structure::Device::new(&instance.raw, &raw)),
             pipelines: pipeline.then(|| khr::ray_tracing_pipeline::Device::new(&instance.raw, &raw)),
@@ -233,7 +238,11 @@ fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {
         },
     };
     let Some(info) = found else {
-        return Err(Error::Device(format!("no device matches '{}'; available: {}", wanted.unwrap_or_default(), names())));
+        return Err(Error::Device(format!(
+            "no device matches '{}'; available: {}",
+            wanted.unwrap_or_default(),
+            names()
+        )));
     };
     if !info.missing_floor.is_empty() {
         return Err(Error::Device(format!(

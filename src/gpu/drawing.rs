@@ -54,7 +54,8 @@ impl<'d> Recorder<'d> {
         );
 
         // both targets are cleared: no primitive, and the furthest depth, which is 0
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: size[0], height: size[1] } };
+        let area =
+            vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: size[0], height: size[1] } };
         let ids = [vk::RenderingAttachmentInfo::default()
             .image_view(targets.ids.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
@@ -67,8 +68,11 @@ impl<'d> Recorder<'d> {
             .load_op(vk::AttachmentLoadOp::CLEAR)
             .store_op(vk::AttachmentStoreOp::DONT_CARE)
             .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } });
-        let info =
-            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&ids).depth_attachment(&depth);
+        let info = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&ids)
+            .depth_attachment(&depth);
 
         // a viewport that is larger than the device allows is scaled about its middle
         let factor = self.device.viewport_factor(size);
@@ -128,7 +132,9 @@ impl<'d> Recorder<'d> {
             .subresource_range(range(aspect))];
         // SAFETY: recording state, outside of a render pass instance
         unsafe {
-            self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
+            self.device
+                .raw
+                .cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
         };
     }
 }

@@ -89,8 +89,8 @@ pub(super) fn prepare() -> Result<()> {
             if name == CACHE {
                 // older versions of Mesa create only the last folder of the path
                 let folder = PathBuf::from(&value);
-                let is_writable =
-                    std::fs::create_dir_all(&folder).is_ok() && crate::files::check_writable(&folder.join("any")).is_ok();
+                let is_writable = std::fs::create_dir_all(&folder).is_ok()
+                    && crate::files::check_writable(&folder.join("any")).is_ok();
                 if !is_writable {
                     // Mesa would print a line and do the same
                     (name, value) = (NO_CACHE, "true".into());
@@ -202,7 +202,9 @@ fn changes(
     preferred: Option<u32>,
     folder: Option<PathBuf>,
 ) -> Vec<(&'static str, OsString)> {
-    let Some(chosen) = width.clone().or_else(|| preferred.map(|bits| bits.to_string().into())) else { return Vec::new() };
+    let Some(chosen) = width.clone().or_else(|| preferred.map(|bits| bits.to_string().into())) else {
+        return Vec::new();
+    };
     let mut name = OsString::from("mesa-");
     name.push(&chosen);
     // without a separate cache folder the driver's default width stays
@@ -259,12 +261,18 @@ mod tests {
     fn the_limit_for_files_is_read() {
         let read_limit = |limit: &str| {
             let head = "Limit                     Soft Limit           Hard Limit           Units\nMax cpu time              5                    unlimited            seconds\n";
-            file_size_limit_in(&format!("{head}Max file size             {limit}                 unlimited            bytes\n"))
+            file_size_limit_in(&format!(
+                "{head}Max file size             {limit}                 unlimited            bytes\n"
+            ))
         };
         assert_eq!((read_limit("8192"), read_limit("unlimited"), file_size_limit_in("")), (Some(8192), None, None));
     }
 
-    fn changes_as_text(width: Option<&str>, cache: Option<&str>, preferred: Option<u32>) -> Vec<(&'static str, String)> {
+    fn changes_as_text(
+        width: Option<&str>,
+        cache: Option<&str>,
+        preferred: Option<u32>,
+    ) -> Vec<(&'static str, String)> {
         let all = changes(width.map(Into::into), cache.map(Into::into), preferred, Some("/home/.cache/skylit".into()));
         all.into_iter().map(|(name, value)| (name, value.into_string().unwrap())).collect()
     }
@@ -272,7 +280,10 @@ mod tests {
     #[test]
     fn each_width_has_a_cache_of_its_own() {
         let cache = |path: &str| (CACHE, path.to_owned());
-        assert_eq!(changes_as_text(None, None, Some(512)), [cache("/home/.cache/skylit/mesa-512"), (WIDTH, "512".to_owned())]);
+        assert_eq!(
+            changes_as_text(None, None, Some(512)),
+            [cache("/home/.cache/skylit/mesa-512"), (WIDTH, "512".to_owned())]
+        );
         assert_eq!(changes_as_text(None, Some("/c"), Some(256)), [cache("/c/mesa-256"), (WIDTH, "256".to_owned())]);
         // the driver's own choice
         assert_eq!(changes_as_text(None, Some("/c"), None), []);
@@ -289,7 +300,10 @@ mod tests {
         assert!(["128", "256", "512"].iter().all(|width| with(width).is_ok()) && check(&|_| None).is_ok());
         for wrong in ["0", "7", "64", "1024", "-256", "256 ", "0x100", "wide", "4294967552"] {
             let error = with(wrong).unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().contains(&format!("{WIDTH}={wrong} is no width")), "{error}");
+            assert!(
+                error.exit_code() == 2 && error.to_string().contains(&format!("{WIDTH}={wrong} is no width")),
+                "{error}"
+            );
         }
     }
 

@@ -46,11 +46,13 @@ impl GraphicsPipeline {
         let _timer = CompileTimer::start();
         let module = |shader| Module::new(device, name, shader, specialization);
         let modules = [module(vertex)?, module(fragment)?];
-        let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
+        let mut pipeline =
+            Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
 
         // no vertex buffers: shaders read the scene's records themselves
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let assembly =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
@@ -60,7 +62,8 @@ impl GraphicsPipeline {
             })
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .line_width(1.0);
-        let multisample = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let multisample =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
 
         // depth is reversed: nearer is greater
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
@@ -77,10 +80,12 @@ impl GraphicsPipeline {
 
         // dynamic rendering: the formats stand in for a render pass
         let formats = [IDS];
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats).depth_attachment_format(DEPTH);
-        let stage =
-            |k: usize, stage| vk::PipelineShaderStageCreateInfo::default().stage(stage).module(modules[k].raw).name(c"main");
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .color_attachment_formats(&formats)
+            .depth_attachment_format(DEPTH);
+        let stage = |k: usize, stage| {
+            vk::PipelineShaderStageCreateInfo::default().stage(stage).module(modules[k].raw).name(c"main")
+        };
         let stages = [stage(0, vk::ShaderStageFlags::VERTEX), stage(1, vk::ShaderStageFlags::FRAGMENT)];
         let info = [vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)

@@ -126,7 +126,8 @@ impl DeviceInfo {
     /// Whether the driver leaves any loop in a shader after 65,535 iterations, as Mesa's CPU driver
     /// did before version 23.
     pub fn cuts_long_loops(&self) -> bool {
-        let major = self.driver.split("Mesa ").nth(1).and_then(|v| v.split('.').next()).and_then(|v| v.parse::<u32>().ok());
+        let major =
+            self.driver.split("Mesa ").nth(1).and_then(|v| v.split('.').next()).and_then(|v| v.parse::<u32>().ok());
         self.is_cpu() && major.is_some_and(|m| m < 23)
     }
 
@@ -168,7 +169,12 @@ fn vector_bits(name: &str) -> Option<u32> {
 }
 
 /// Whether images of this format can be render targets.
-fn is_target(raw: &ash::Instance, physical: vk::PhysicalDevice, format: vk::Format, target: vk::FormatFeatureFlags) -> bool {
+fn is_target(
+    raw: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    format: vk::Format,
+    target: vk::FormatFeatureFlags,
+) -> bool {
     // SAFETY: the physical device belongs to the living instance
     let features = unsafe { raw.get_physical_device_format_properties(physical, format) }.optimal_tiling_features;
     features.contains(target)
@@ -190,7 +196,8 @@ pub fn enumerate(instance: &Instance) -> Result<Vec<DeviceInfo>> {
 fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<DeviceInfo> {
     let raw = &instance.raw;
     // SAFETY (all queries below): the physical device belongs to the living instance
-    let extensions = unsafe { raw.enumerate_device_extension_properties(physical) }.context("listing device extensions")?;
+    let extensions =
+        unsafe { raw.enumerate_device_extension_properties(physical) }.context("listing device extensions")?;
     let has = |name: &CStr| {
         extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)) && !name.to_str().is_ok_and(faults::lacks)
     };
@@ -266,7 +273,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         index,
         name: text(&properties.device_name),
         kind,
-        api_version: format!("{}.{}.{}", vk::api_version_major(api), vk::api_version_minor(api), vk::api_version_patch(api)),
+        api_version: format!(
+            "{}.{}.{}",
+            vk::api_version_major(api),
+            vk::api_version_minor(api),
+            vk::api_version_patch(api)
+        ),
         driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)),
         vendor_id: properties.vendor_id,
         device_id: properties.device_id,
@@ -324,7 +336,10 @@ fn missing_raster(
         (has_graphics_queue, "a queue for graphics and compute"),
         (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
         (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
-        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "render targets of format R32G32_UINT"),
+        (
+            is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT),
+            "render targets of format R32G32_UINT",
+        ),
         (
             is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT),
             "depth images of format D32_SFLOAT",

@@ -33,7 +33,10 @@ pub struct Instance {
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub(super) debug_names: bool,
     // dropped last, because that unloads the library
-    #[cfg_attr(not(feature = "viewer"), allow(dead_code, reason = "it is kept loaded; only surfaces of windows use it"))]
+    #[cfg_attr(
+        not(feature = "viewer"),
+        allow(dead_code, reason = "it is kept loaded; only surfaces of windows use it")
+    )]
     pub(super) entry: ash::Entry,
 }
 
@@ -85,8 +88,8 @@ impl Instance {
 
         // the layer and extensions that diagnostics need
         // SAFETY: no preconditions
-        let layers =
-            unsafe { entry.enumerate_instance_layer_properties() }.map_err(|r| explain_loader("listing Vulkan layers", r))?;
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }
+            .map_err(|r| explain_loader("listing Vulkan layers", r))?;
         if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::Device(
                 "--validation needs VK_LAYER_KHRONOS_validation, which is not installed: install vulkan-validationlayers"
@@ -96,7 +99,8 @@ impl Instance {
         // SAFETY: no preconditions
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
             .map_err(|r| explain_loader("listing Vulkan extensions", r))?;
-        let debug_names = validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        let debug_names =
+            validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
 
         let application = vk::ApplicationInfo::default()
             .application_name(c"skylit")
@@ -118,8 +122,8 @@ impl Instance {
             info = info.push_next(m);
         }
         // SAFETY: all pointers in `info` outlive the call
-        let raw =
-            unsafe { entry.create_instance(&info, None) }.map_err(|r| explain_loader("creating the Vulkan instance", r))?;
+        let raw = unsafe { entry.create_instance(&info, None) }
+            .map_err(|r| explain_loader("creating the Vulkan instance", r))?;
 
         // messages of the validation layer go to a log
         let messenger = match &log {

@@ -93,7 +93,8 @@ fn first_with(
         let paths = variable(name).map_or_else(Vec::new, |value| std::env::split_paths(&value).collect());
         paths.into_iter().filter(|path| !path.as_os_str().is_empty()).map(move |path| (Some(name), kind, path))
     });
-    let installed = bases(variable).into_iter().flat_map(|base| FOLDERS.map(|(folder, kind)| (None, kind, base.join(folder))));
+    let installed =
+        bases(variable).into_iter().flat_map(|base| FOLDERS.map(|(folder, kind)| (None, kind, base.join(folder))));
     named.chain(installed).find_map(|(name, kind, path)| {
         let is_asked_for = name.is_some();
         let (file, why) =
@@ -101,9 +102,13 @@ fn first_with(
         let (file, kind) = (file.display(), kind.name());
         Some(Error::Device(match name {
             Some(name) => {
-                format!("{name} names {file}, which is no manifest of a Vulkan {kind}: {why}; correct or unset the variable")
+                format!(
+                    "{name} names {file}, which is no manifest of a Vulkan {kind}: {why}; correct or unset the variable"
+                )
             }
-            None => format!("{file} is no manifest of a Vulkan {kind}: {why}; remove the file or install its {kind} again"),
+            None => {
+                format!("{file} is no manifest of a Vulkan {kind}: {why}; remove the file or install its {kind} again")
+            }
         }))
     })
 }
@@ -111,7 +116,8 @@ fn first_with(
 /// Folders of the user and of the system with a folder `vulkan`, as the loader finds them.
 fn bases(variable: &dyn Fn(&str) -> Option<OsString>) -> Vec<PathBuf> {
     let home = variable("HOME").map(PathBuf::from);
-    let of_user = |name: &str, below: &str| variable(name).map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(below)));
+    let of_user =
+        |name: &str, below: &str| variable(name).map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(below)));
     let of_system = |name: &str, otherwise: &str| -> Vec<PathBuf> {
         std::env::split_paths(&variable(name).unwrap_or_else(|| otherwise.into())).collect()
     };
@@ -182,11 +188,14 @@ mod tests {
     fn broken_manifests_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
-        let good = r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "libvulkan_lvp.so", "api_version": "1.3.0"}}"#;
+        let good =
+            r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "libvulkan_lvp.so", "api_version": "1.3.0"}}"#;
         std::fs::write(at("good.json"), good).unwrap();
         let first_error = |name: &'static str, path: PathBuf| {
             let variable = move |asked: &str| match asked {
-                "XDG_DATA_DIRS" | "XDG_CONFIG_DIRS" | "XDG_CONFIG_HOME" | "XDG_DATA_HOME" => Some("/nonexistent".into()),
+                "XDG_DATA_DIRS" | "XDG_CONFIG_DIRS" | "XDG_CONFIG_HOME" | "XDG_DATA_HOME" => {
+                    Some("/nonexistent".into())
+                }
                 _ => (asked == name).then(|| path.clone().into_os_string()),
             };
             first_with(&variable, &fault).map(|e| (e.exit_code(), e.to_string()))
@@ -212,13 +221,18 @@ mod tests {
                 let both = std::env::join_paths([at("good.json"), at("broken.json")]).unwrap();
                 for path in [at("broken.json"), dir.path().to_owned(), both.into()] {
                     let (code, error) = first_error(name, path).unwrap();
-                    assert!(code == 2 && error.starts_with(&format!("{name} names {file}, which is no manifest")), "{error}");
+                    assert!(
+                        code == 2 && error.starts_with(&format!("{name} names {file}, which is no manifest")),
+                        "{error}"
+                    );
                     assert!(error.contains(why) && error.lines().count() == 1, "{error}");
                 }
             }
         }
         assert!(first_error("VK_DRIVER_FILES", at("missing.json")).unwrap().1.contains("no such file"));
-        assert!(first_error("VK_LAYER_PATH", dir.path().to_owned()).unwrap().1.contains("no manifest of a Vulkan layer"));
+        assert!(
+            first_error("VK_LAYER_PATH", dir.path().to_owned()).unwrap().1.contains("no manifest of a Vulkan layer")
+        );
         // one that was installed
         std::fs::create_dir_all(at("data/vulkan/icd.d")).unwrap();
         std::fs::rename(at("broken.json"), at("data/vulkan/icd.d/broken.json")).unwrap();

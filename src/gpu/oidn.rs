@@ -55,7 +55,8 @@ impl Oidn {
     /// # Errors
     /// [`Error::Device`] if the library is not installed or does not support this CPU.
     pub fn open() -> Result<Self> {
-        let missing = |why: String| Error::Device(format!("Open Image Denoise: {why}; install it, or use --denoise filter"));
+        let missing =
+            |why: String| Error::Device(format!("Open Image Denoise: {why}; install it, or use --denoise filter"));
         // SAFETY: the library's initialisation has no requirements of its own
         let library = NAMES.iter().find_map(|name| unsafe { Library::new(name) }.ok());
         let library = library.ok_or_else(|| missing(format!("{} was not found", NAMES[0])))?;

@@ -66,7 +66,12 @@ pub(super) struct Module<'a> {
 
 impl<'a> Module<'a> {
     /// Creates a module whose specialization constants are set: pipelines need not set them.
-    pub(super) fn new(device: &'a Device, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
+    pub(super) fn new(
+        device: &'a Device,
+        name: &str,
+        shader: &Shader,
+        specialization: &Specialization,
+    ) -> Result<Self> {
         let words = specialize(&shader.spirv()?, &specialization.entries, device.info.is_cpu())
             .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
         // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the
@@ -88,8 +93,10 @@ impl Drop for Module<'_> {
 pub(super) fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk::PipelineLayout> {
     let ranges = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: PUSH_BYTES }];
     // SAFETY: a plain layout
-    unsafe { device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None) }
-        .context("the pipeline layout")
+    unsafe {
+        device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None)
+    }
+    .context("the pipeline layout")
 }
 
 /// The identity of a pipeline: hashes of its shaders' SPIR-V (of the contents, because
@@ -102,7 +109,11 @@ struct Key {
 }
 
 impl Key {
-    fn new<'a>(shaders: impl IntoIterator<Item = &'a Shader>, specialization: &Specialization, flags: u32) -> Result<Self> {
+    fn new<'a>(
+        shaders: impl IntoIterator<Item = &'a Shader>,
+        specialization: &Specialization,
+        flags: u32,
+    ) -> Result<Self> {
         let hash = |shader: &Shader| Ok(xxhash_rust::xxh3::xxh3_128(&shader.spirv()?));
         let shaders = shaders.into_iter().map(hash).collect::<Result<_>>()?;
         Ok(Self { shaders, specialization: specialization.clone(), flags })
@@ -327,11 +338,16 @@ impl RayTracingPipeline {
         specialization: &Specialization,
     ) -> Result<Self> {
         let _timer = CompileTimer::start();
-        let functions =
-            device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
+        let functions = device
+            .pipelines
+            .as_ref()
+            .ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
         let optional = shared.triangle_any.into_iter().chain(shared.sphere.into_iter().flatten());
-        let key =
-            Key::new([raygen, shared.miss, shared.triangle_closest].into_iter().chain(optional), specialization, u32::MAX)?;
+        let key = Key::new(
+            [raygen, shared.miss, shared.triangle_closest].into_iter().chain(optional),
+            specialization,
+            u32::MAX,
+        )?;
         device.live.get(key, || Self::compile(device, functions, name, raygen, shared, specialization)).map(Self)
     }
 
@@ -459,8 +475,11 @@ impl Table {
             }
             offset += sizes[k];
         }
-        let region =
-            |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR { device_address: addresses[k], stride, size: sizes[k] };
+        let region = |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR {
+            device_address: addresses[k],
+            stride,
+            size: sizes[k],
+        };
         // the ray generation table's size must be its stride
         Ok(Self { raygen: region(0, sizes[0]), miss: region(1, stride), hit: region(2, stride), _buffer: table })
     }

@@ -65,7 +65,8 @@ impl WindowRenderer {
         let no_handle = |e| Error::Device(format!("the window cannot be drawn to: {e}"));
         let display = target.display_handle().map_err(no_handle)?.as_raw();
         let window = target.window_handle().map_err(no_handle)?.as_raw();
-        let extensions = ash_window::enumerate_required_extensions(display).context("listing extensions of surfaces")?;
+        let extensions =
+            ash_window::enumerate_required_extensions(display).context("listing extensions of surfaces")?;
         let instance = Instance::with_extensions(validation, extensions)?;
 
         // SAFETY: the handles are those of a window that lives as long as the surface
@@ -75,8 +76,8 @@ impl WindowRenderer {
 
         // a device that can present to this surface; without one the surface goes again
         let chosen = choose(&instance, &surfaces, surface, device_name);
-        let created =
-            chosen.and_then(|(physical, family)| create_device(&instance, physical, family).map(|d| (physical, family, d)));
+        let created = chosen
+            .and_then(|(physical, family)| create_device(&instance, physical, family).map(|d| (physical, family, d)));
         let (physical, family, device) = match created {
             Ok(created) => created,
             Err(e) => {
@@ -119,8 +120,12 @@ impl WindowRenderer {
         // SAFETY (all calls below): plain objects of the living device
         let formats =
             unsafe { self.surfaces.get_physical_device_surface_formats(self.physical, self.surface) }.context(what)?;
-        let wanted =
-            [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB, vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
+        let wanted = [
+            vk::Format::B8G8R8A8_SRGB,
+            vk::Format::R8G8B8A8_SRGB,
+            vk::Format::B8G8R8A8_UNORM,
+            vk::Format::R8G8B8A8_UNORM,
+        ];
         let found = wanted.iter().find_map(|w| formats.iter().find(|f| f.format == *w)).or(formats.first());
         self.format = *found.ok_or_else(|| Error::Device("the window has no format of pixels".into()))?;
 
@@ -145,7 +150,8 @@ impl WindowRenderer {
             dst_access_mask: vk::AccessFlags::COLOR_ATTACHMENT_WRITE,
             dependency_flags: vk::DependencyFlags::empty(),
         }];
-        let pass = vk::RenderPassCreateInfo::default().attachments(&attachment).subpasses(&subpass).dependencies(&dependency);
+        let pass =
+            vk::RenderPassCreateInfo::default().attachments(&attachment).subpasses(&subpass).dependencies(&dependency);
         self.render_pass = unsafe { self.device.create_render_pass(&pass, None) }.context(what)?;
 
         // one frame is in flight: a command buffer, a fence and a semaphore do
@@ -156,7 +162,8 @@ impl WindowRenderer {
         let buffers = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         self.commands = unsafe { self.device.allocate_command_buffers(&buffers) }.context(what)?[0];
         self.fence = unsafe { self.device.create_fence(&vk::FenceCreateInfo::default(), None) }.context(what)?;
-        self.available = unsafe { self.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }.context(what)?;
+        self.available =
+            unsafe { self.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }.context(what)?;
 
         // the painter has to know who encodes
         let srgb_framebuffer = [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB].contains(&self.format.format);
@@ -198,8 +205,9 @@ impl WindowRenderer {
 
         // SAFETY (all calls below): one frame is in flight at a time, and its fence was waited for,
         // so that nothing of it is in use
-        let acquired =
-            unsafe { self.swapchains.acquire_next_image(self.swapchain.raw, u64::MAX, self.available, vk::Fence::null()) };
+        let acquired = unsafe {
+            self.swapchains.acquire_next_image(self.swapchain.raw, u64::MAX, self.available, vk::Fence::null())
+        };
         let index = match acquired {
             Ok((index, is_suboptimal)) => {
                 self.swapchain.is_stale = is_suboptimal;
@@ -246,7 +254,8 @@ impl WindowRenderer {
 
         // presented once drawing has finished; then nothing is in flight any more
         let (swapchain, indices) = ([self.swapchain.raw], [index]);
-        let present = vk::PresentInfoKHR::default().wait_semaphores(&finished).swapchains(&swapchain).image_indices(&indices);
+        let present =
+            vk::PresentInfoKHR::default().wait_semaphores(&finished).swapchains(&swapchain).image_indices(&indices);
         let presented = unsafe { self.swapchains.queue_present(self.queue, &present) };
         unsafe {
             self.device.wait_for_fences(&[self.fence], true, u64::MAX).context(what)?;
@@ -274,8 +283,10 @@ impl WindowRenderer {
 
         // the size that the surface has, or takes
         let capabilities =
-            unsafe { self.surfaces.get_physical_device_surface_capabilities(self.physical, self.surface) }.context(what)?;
-        let (least, most, now) = (capabilities.min_image_extent, capabilities.max_image_extent, capabilities.current_extent);
+            unsafe { self.surfaces.get_physical_device_surface_capabilities(self.physical, self.surface) }
+                .context(what)?;
+        let (least, most, now) =
+            (capabilities.min_image_extent, capabilities.max_image_extent, capabilities.current_extent);
         let extent = match now.width {
             // the surface takes the size that it is given
             u32::MAX => vk::Extent2D {
@@ -339,7 +350,8 @@ impl WindowRenderer {
                 .layers(1);
             let framebuffer = unsafe { self.device.create_framebuffer(&framebuffer, None) }.context(what)?;
             self.swapchain.framebuffers.push(framebuffer);
-            let finished = unsafe { self.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }.context(what)?;
+            let finished =
+                unsafe { self.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }.context(what)?;
             self.swapchain.finished.push(finished);
         }
         Ok(true)
@@ -394,9 +406,11 @@ fn choose(
             continue;
         }
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
-        let can_present = |family: u32| unsafe { surfaces.get_physical_device_surface_support(physical, family, surface) };
-        let family = (0..families.len() as u32)
-            .find(|k| families[*k as usize].queue_flags.contains(vk::QueueFlags::GRAPHICS) && can_present(*k).unwrap_or(false));
+        let can_present =
+            |family: u32| unsafe { surfaces.get_physical_device_surface_support(physical, family, surface) };
+        let family = (0..families.len() as u32).find(|k| {
+            families[*k as usize].queue_flags.contains(vk::QueueFlags::GRAPHICS) && can_present(*k).unwrap_or(false)
+        });
         if let Some(family) = family {
             let own = properties.device_name_as_c_str().map(CStr::to_string_lossy).unwrap_or_default();
             found.push((physical, family, name.is_some_and(|n| own == n)));

@@ -47,7 +47,12 @@ impl Aov {
 
 /// Renders the outputs of an image, rows from the top. The tracer must have been built with the
 /// [`crate::tracer::Needs`] of the outputs.
-pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
+pub fn render(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    size: [u32; 2],
+    control: &mut dyn Control,
+) -> Result<Vec<AovPixel>> {
     render_with(tracer, camera, size, Primary::Traced, control)
 }
 

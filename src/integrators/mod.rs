@@ -155,7 +155,8 @@ pub trait Integrator: Sync {
     /// # Errors
     /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera;
     /// [`crate::Error::Interrupted`] when `control` says so.
-    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered>;
+    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control)
+    -> Result<Rendered>;
 
     /// Converts the image to what an 8-bit file shows.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image;
@@ -193,7 +194,12 @@ impl RenderJob<'_> {
     }
 
     /// Finds the tiles of the image that can show geometry; `None` if all tiles are needed.
-    pub fn tile_mask(&self, integrator: &dyn Integrator, flat: &FlatScene, camera: &CameraRecord) -> Option<Arc<TileMask>> {
+    pub fn tile_mask(
+        &self,
+        integrator: &dyn Integrator,
+        flat: &FlatScene,
+        camera: &CameraRecord,
+    ) -> Option<Arc<TileMask>> {
         if !integrator.skips_empty_tiles(self) {
             return None;
         }

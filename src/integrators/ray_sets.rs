@@ -124,7 +124,8 @@ fn normal(scene: &Scene, hit: &Hit, at: DVec3) -> Option<DVec3> {
         }
         Geometry::Spheres(s) => {
             let inverse = to_world.inverse();
-            let local = inverse.transform_point3(at + scene.origin()) - s.get(hit.primitive as usize)?.center.as_dvec3();
+            let local =
+                inverse.transform_point3(at + scene.origin()) - s.get(hit.primitive as usize)?.center.as_dvec3();
             Some(inverse.matrix3.transpose() * local)
         }
     }
@@ -186,10 +187,15 @@ mod tests {
                 let part = sample(&rays, divisor);
                 // no gap as long as a sixteenth of the image, nor after the last chunk
                 let gap = |w: &[Ray]| (w[1].origin[0] - w[0].origin[0]) as usize;
-                let longest = part.windows(2).map(gap).max().unwrap().max(n - 1 - part[part.len() - 1].origin[0] as usize);
+                let longest =
+                    part.windows(2).map(gap).max().unwrap().max(n - 1 - part[part.len() - 1].origin[0] as usize);
                 assert!(longest <= n / 16, "{n} rays, one in {divisor}: none of {longest} in a row");
                 let most = (n / divisor).max(2 * CHUNK[0] * CHUNKS) * 5 / 4;
-                assert!(part.len() <= most && part.len() >= (n / divisor).min(n), "{n} rays, one in {divisor}: {}", part.len());
+                assert!(
+                    part.len() <= most && part.len() >= (n / divisor).min(n),
+                    "{n} rays, one in {divisor}: {}",
+                    part.len()
+                );
             }
         }
     }
@@ -218,7 +224,11 @@ mod tests {
             assert!(shadow_rays(&scene, &[down], &[hit], &[], DVec3::Y).is_err());
         }
         let sphere = crate::scene::builtin::by_name("sphere-over-plane").unwrap();
-        let k = sphere.instances.iter().position(|i| matches!(sphere.meshes[i.mesh].geometry, Geometry::Spheres(_))).unwrap();
+        let k = sphere
+            .instances
+            .iter()
+            .position(|i| matches!(sphere.meshes[i.mesh].geometry, Geometry::Spheres(_)))
+            .unwrap();
         let hit = Hit { t: 1.0, instance: k as u32, primitive: 0, ..Hit::MISS };
         let top = DVec3::new(0.0, 2.25, 0.0) - sphere.origin();
         let n = normal(&sphere, &hit, top).unwrap().normalize();

@@ -104,9 +104,21 @@ impl<'t> PreparedRays<'t> {
             .ok_or_else(|| Error::Usage(format!("{} rays: the maximum is 2^28", rays.len())))?;
         let source = Buffer::from_slice(device, "rays", rays)?;
         let results = Buffer::new(device, "hits", Self::record(mode) * count as u64, Memory::Device)?;
-        let set = Buffer::from_slice(device, "ray set", &[RaySet { rays: source.address(), results: results.address() }])?;
+        let set =
+            Buffer::from_slice(device, "ray set", &[RaySet { rays: source.address(), results: results.address() }])?;
         let commands = Commands::new(device)?;
-        Ok(Self { tracer, stream, mode, count, results, set, _source: source, commands, pace: Pace::default(), passes: 0 })
+        Ok(Self {
+            tracer,
+            stream,
+            mode,
+            count,
+            results,
+            set,
+            _source: source,
+            commands,
+            pace: Pace::default(),
+            passes: 0,
+        })
     }
 
     /// Bytes of a result.
@@ -130,7 +142,8 @@ impl<'t> PreparedRays<'t> {
             let timings = self.commands.run(|r| {
                 while recorded < launches && first < n {
                     let count = rays.min(n - first);
-                    let push = Push { scene: tracer.scene_address(), pass: set.address(), first, count, ..Default::default() };
+                    let push =
+                        Push { scene: tracer.scene_address(), pass: set.address(), first, count, ..Default::default() };
                     // launches do not depend on each other
                     stream.record(r, &push);
                     first += count;

@@ -12,7 +12,11 @@ pub(super) struct Declaration {
 
 impl Declaration {
     /// A choice, whose help texts say what the variants mean.
-    fn from_choice<T: Copy>(name: &'static str, all: &[T], variant: fn(T) -> (&'static str, u32, &'static str)) -> Self {
+    fn from_choice<T: Copy>(
+        name: &'static str,
+        all: &[T],
+        variant: fn(T) -> (&'static str, u32, &'static str),
+    ) -> Self {
         Self { name, variants: all.iter().map(|&v| variant(v)).collect() }
     }
 }

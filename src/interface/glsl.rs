@@ -46,7 +46,9 @@ fn file(name: &str, text: &str) -> (String, String) {
     let guard = format!("INTERFACE_{}", name.to_uppercase());
     (
         format!("interface/{name}.glsl"),
-        format!("// Generated from the declarations in src/interface.\n#ifndef {guard}\n#define {guard}\n{text}#endif\n"),
+        format!(
+            "// Generated from the declarations in src/interface.\n#ifndef {guard}\n#define {guard}\n{text}#endif\n"
+        ),
     )
 }
 
@@ -54,7 +56,11 @@ fn constants() -> String {
     let mut text = String::new();
     for (id, c) in constants::ALL.iter().enumerate() {
         let suffix = if c.kind == "uint" { "u" } else { "" };
-        let _ = writeln!(text, "layout(constant_id = {id}) const {} {} = {}{suffix};  //{}", c.kind, c.name, c.default, c.doc);
+        let _ = writeln!(
+            text,
+            "layout(constant_id = {id}) const {} {} = {}{suffix};  //{}",
+            c.kind, c.name, c.default, c.doc
+        );
     }
     text
 }
@@ -75,7 +81,8 @@ fn feature_set(set: &features::Declaration) -> String {
     }
     let (words, all) = (set.name.to_uppercase(), if set.is_full { "0xffffffffu" } else { "0u" });
     for word in 0..set.features.len().div_ceil(32) {
-        let _ = writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
+        let _ =
+            writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
     }
     let _ = writeln!(text, "const uint {words}_COUNT = {}u;", set.features.len());
     for (k, (name, doc)) in set.features.iter().enumerate() {
@@ -91,8 +98,10 @@ fn feature_set(set: &features::Declaration) -> String {
 /// Generates the numbers of reflection models, and functions that dispatch to those in use.
 fn bsdf_dispatch() -> String {
     // HAS_NAME
-    let names: Vec<_> = features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
-    let mut text: String = names.iter().map(|name| format!("#include \"bsdf/{}.glsl\"\n", name.to_lowercase())).collect();
+    let names: Vec<_> =
+        features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
+    let mut text: String =
+        names.iter().map(|name| format!("#include \"bsdf/{}.glsl\"\n", name.to_lowercase())).collect();
     let mut function = |head: &str, call: &str, otherwise: &str| {
         let _ = writeln!(text, "{head} {{");
         for name in &names {
@@ -121,7 +130,8 @@ fn light_dispatch() -> String {
         .iter()
         .map(|(name, _)| name.trim_start_matches("HAS_").trim_end_matches("_LIGHTS").to_owned())
         .collect();
-    let mut text: String = names.iter().map(|name| format!("#include \"lights/{}.glsl\"\n", name.to_lowercase())).collect();
+    let mut text: String =
+        names.iter().map(|name| format!("#include \"lights/{}.glsl\"\n", name.to_lowercase())).collect();
     let mut function = |head: &str, call: &str, otherwise: &str| {
         let _ = writeln!(text, "{head} {{");
         for name in &names {
@@ -298,13 +308,15 @@ mod tests {
         assert!(scene.contains("uvec2 w11 = LOAD_PAIR(base, 12u * k + 11u);"), "{scene}");
         assert!(scene.contains("    return SubmeshRecord(uvec2(w0.x, w0.y), "), "{scene}");
         assert!(
-            text("lights")
-                .contains("LightRecord(vec3(uintBitsToFloat(w0.x), uintBitsToFloat(w0.y), uintBitsToFloat(w1.x)), float(")
+            text("lights").contains(
+                "LightRecord(vec3(uintBitsToFloat(w0.x), uintBitsToFloat(w0.y), uintBitsToFloat(w1.x)), float("
+            )
         );
         // a record with others in it
         assert!(!text("shading").contains("load_"));
         assert!(
-            text("block").starts_with("// Generated from") && text("block").contains("#include \"interface/queue.glsl\"\n")
+            text("block").starts_with("// Generated from")
+                && text("block").contains("#include \"interface/queue.glsl\"\n")
         );
         assert!(text("ray").contains("layout(push_constant) uniform Push {"));
     }

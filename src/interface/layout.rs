@@ -122,12 +122,16 @@ pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: 
             continue;
         };
         if record.fields.len() != other.members.len() {
-            out.push(format!("record {name}: {} fields in Rust, {} in SPIR-V", record.fields.len(), other.members.len()));
+            out.push(format!(
+                "record {name}: {} fields in Rust, {} in SPIR-V",
+                record.fields.len(),
+                other.members.len()
+            ));
         }
         // the fields after a misplaced one are misplaced, too: report the first
         let mut pairs = record.fields.iter().zip(&other.members);
-        if let Some((field, (member, offset, size))) =
-            pairs.find(|(field, (member, offset, size))| (field.name, field.offset, field.size) != (member, *offset, *size))
+        if let Some((field, (member, offset, size))) = pairs
+            .find(|(field, (member, offset, size))| (field.name, field.offset, field.size) != (member, *offset, *size))
         {
             out.push(format!(
                 "record {name}: field {} is {} bytes at offset {} in Rust, {member} is {size} bytes at offset {offset} in SPIR-V",
@@ -254,7 +258,11 @@ mod tests {
     };
 
     fn reflected() -> Reflected {
-        Reflected { name: "Sphere".into(), members: vec![("center".into(), 0, 12), ("radius".into(), 12, 4)], stride: Some(16) }
+        Reflected {
+            name: "Sphere".into(),
+            members: vec![("center".into(), 0, 12), ("radius".into(), 12, 4)],
+            stride: Some(16),
+        }
     }
 
     #[test]

@@ -64,7 +64,8 @@ pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[H
     let wrong = |k: &usize| {
         let one = *k..*k + 1;
         // what agrees within rounding is no fault of either
-        parity::judge_pair(&small.oracle, &rays[one.clone()], &a[one.clone()], &b[one], Rounding::default()).unexplained > 0
+        parity::judge_pair(&small.oracle, &rays[one.clone()], &a[one.clone()], &b[one], Rounding::default()).unexplained
+            > 0
             && parity::is_admissible(&small.oracle, &OracleRay::from(&rays[*k]), &b[*k], Rounding::default()).is_err()
     };
     let any = judged.unexplained > 0;
@@ -110,8 +111,8 @@ pub fn compare_any<E>(
 
 /// The report of the rays that do not differ.
 fn agreeing(n: usize, differing: &[usize], reference: &[Hit]) -> ParityReport {
-    let hits =
-        reference[..n].iter().filter(|h| h.is_hit()).count() - differing.iter().filter(|&&i| reference[i].is_hit()).count();
+    let hits = reference[..n].iter().filter(|h| h.is_hit()).count()
+        - differing.iter().filter(|&&i| reference[i].is_hit()).count();
     let rays = (n - differing.len()) as u64;
     ParityReport { rays, hits: hits as u64, agree: rays, ..Default::default() }
 }
@@ -253,7 +254,8 @@ mod tests {
     #[test]
     fn occlusion_that_differs_is_judged() {
         let (scene, rays, closest) = set("stairs");
-        let any: Vec<Hit> = closest.iter().map(|h| if h.is_hit() { Hit { t: 0.0, ..Hit::MISS } } else { Hit::MISS }).collect();
+        let any: Vec<Hit> =
+            closest.iter().map(|h| if h.is_hit() { Hit { t: 0.0, ..Hit::MISS } } else { Hit::MISS }).collect();
         let k = any.iter().position(Hit::is_hit).unwrap();
         let mut wrong = any.clone();
         wrong[k] = Hit::MISS;

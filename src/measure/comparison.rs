@@ -116,7 +116,10 @@ impl Comparison {
         if nan > 0 {
             failed(format!("the images differ: {} not a number (NaN) in one of them only", count(nan)))
         } else if nan_in_both > 0 {
-            failed(format!("the images cannot be compared everywhere: {} not a number (NaN) in both", count(nan_in_both)))
+            failed(format!(
+                "the images cannot be compared everywhere: {} not a number (NaN) in both",
+                count(nan_in_both)
+            ))
         } else if infinite > 0 {
             failed(format!("the images differ: {} infinite in one of them only", count(infinite)))
         } else if self.mask_pixels == 0 {
@@ -178,7 +181,8 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
                 let is_nan_in_one = pairs().any(|(x, y)| x.is_nan() != y.is_nan());
                 bad.nan += u64::from(is_nan_in_one);
                 bad.nan_in_both += u64::from(!is_nan_in_one && pairs().any(|(x, y)| x.is_nan() && y.is_nan()));
-                let differ = |(x, y): (f32, f32)| !x.is_nan() && !y.is_nan() && x != y && (x.is_infinite() || y.is_infinite());
+                let differ =
+                    |(x, y): (f32, f32)| !x.is_nan() && !y.is_nan() && x != y && (x.is_infinite() || y.is_infinite());
                 bad.infinite += u64::from(pairs().all(|(x, y)| x.is_nan() == y.is_nan()) && pairs().any(differ));
             }
             f32::from(u8::from(mask[i] > 0.0 && finite))
@@ -197,15 +201,19 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
     let exceeds = pair.values().any(|(x, y)| x > 1.0 || y > 1.0);
     let hdr = if are_colours && exceeds { flip_hdr(&seen_pair, width, PIXELS_PER_DEGREE)? } else { None };
     let shown = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| srgb_encode(v.clamp(0.0, 1.0))).collect() };
-    let ssim =
-        if are_colours { ssim(&ImagePair::new(&shown(&seen[0]), &shown(&seen[1]), n, Some(&compared))?, width)? } else { None };
+    let ssim = if are_colours {
+        ssim(&ImagePair::new(&shown(&seen[0]), &shown(&seen[1]), n, Some(&compared))?, width)?
+    } else {
+        None
+    };
 
     // counts, and what noise explains
     let errors = [image, reference].map(|image| squared_errors(image, &channels));
     bad.outliers = errors[1].is_some().then(|| outliers(&pair, &errors));
     let [p50, p95, p99] = pair.percentiles([0.5, 0.95, 0.99]);
     let pixels = compared.iter().filter(|c| **c > 0.0).count() as u64;
-    let differing = (0..compared.len()).filter(|&i| compared[i] > 0.0 && a[i * n..][..n] != b[i * n..][..n]).count() as u64;
+    let differing =
+        (0..compared.len()).filter(|&i| compared[i] > 0.0 && a[i * n..][..n] != b[i * n..][..n]).count() as u64;
     let mean_of_errors = |e: &Vec<f32>| {
         let sum: f64 = (0..e.len()).filter(|k| compared[k / n] > 0.0).map(|k| f64::from(e[k])).sum();
         (sum / (pixels * n as u64) as f64).sqrt()
@@ -233,7 +241,11 @@ pub fn compare(image: &Image, reference: &Image, options: &CompareOptions) -> Re
         bad,
         reference_standard_error: errors[1].as_ref().map(mean_of_errors),
         maps: Maps {
-            difference: a.iter().zip(&b).map(|(a, b)| if a.is_finite() && b.is_finite() { a - b } else { f32::NAN }).collect(),
+            difference: a
+                .iter()
+                .zip(&b)
+                .map(|(a, b)| if a.is_finite() && b.is_finite() { a - b } else { f32::NAN })
+                .collect(),
             flip: hdr.map(|f| f.map).or(flips.map(|f| f.map)).unwrap_or_default(),
             compared: compared.clone(),
             mask,

@@ -52,7 +52,8 @@ mod tests {
     /// Values of scipy 1.17.1: norm.sf, 2 * t.sf.
     #[test]
     fn tails_are_those_of_scipy() {
-        let close = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-7, "{value:e}, not {expected:e}");
+        let close =
+            |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-7, "{value:e}, not {expected:e}");
         close(normal_tail(0.0), 0.5);
         close(normal_tail(0.5), 3.085375387259869e-01);
         close(normal_tail(1.0), 1.586552539314571e-01);

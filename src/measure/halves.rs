@@ -28,7 +28,9 @@ impl ReferenceHalves {
     /// Standard error of [`Self::mean`], root mean square over the channels of the pixels whose
     /// `mask` is above 0 (`None`: all).
     pub fn standard_error(&self, channels: usize, mask: Option<&[f32]>) -> Result<f64> {
-        let half = |k: usize| -> Vec<f32> { self.sums[k].iter().map(|sum| (sum / f64::from(self.counts[k])) as f32).collect() };
+        let half = |k: usize| -> Vec<f32> {
+            self.sums[k].iter().map(|sum| (sum / f64::from(self.counts[k])) as f32).collect()
+        };
         Ok(0.5 * ImagePair::new(&half(0), &half(1), channels, mask)?.rmse())
     }
 }

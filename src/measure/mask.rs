@@ -50,7 +50,8 @@ impl MaskOptions {
         let mut conditions = Vec::new();
 
         // what surfaces or a background cover
-        let mut keep = |is_kept: &dyn Fn(usize) -> bool| counted.iter_mut().enumerate().for_each(|(i, c)| *c &= is_kept(i));
+        let mut keep =
+            |is_kept: &dyn Fn(usize) -> bool| counted.iter_mut().enumerate().for_each(|(i, c)| *c &= is_kept(i));
         if let Some((a, b)) = self.covered.then(|| image.f32("A").zip(reference.f32("A"))).flatten() {
             let is_covered = |i: usize| a[i] > 0.0 || b[i] > 0.0;
             // what is not a number is not black
@@ -72,14 +73,17 @@ impl MaskOptions {
             }
             let (columns, rows) = (left..left + w, top..top + h);
             conditions.push(format!("the {w}x{h} pixels at {left},{top}"));
-            keep(&|i| columns.contains(&(i as u64 % u64::from(width))) && rows.contains(&(i as u64 / u64::from(width))));
+            keep(&|i| {
+                columns.contains(&(i as u64 % u64::from(width))) && rows.contains(&(i as u64 / u64::from(width)))
+            });
         }
         if let Some(instance) = self.instance {
             let ids = |image: &'_ Image| image.channels.iter().position(|c| c.name == "id.instance");
             let found = [reference, image].into_iter().find_map(|i| ids(i).map(|k| &i.channels[k].samples));
             let Some(Samples::U32(ids)) = found else {
                 return Err(Error::Usage(
-                    "neither image says which instance a pixel shows (channel id.instance): render one with --aov ids".into(),
+                    "neither image says which instance a pixel shows (channel id.instance): render one with --aov ids"
+                        .into(),
                 ));
             };
             conditions.push(format!("pixels of instance {instance}"));

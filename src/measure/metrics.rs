@@ -89,8 +89,11 @@ impl<'a> ImagePair<'a> {
             let values = &values[i * self.channels..(i + 1) * self.channels];
             values.iter().map(|v| f64::from(*v)).sum::<f64>() / self.channels as f64
         };
-        let differences =
-            || (0..self.image.len() / self.channels).filter(counts).map(|i| pixel(self.image, i) - pixel(self.reference, i));
+        let differences = || {
+            (0..self.image.len() / self.channels)
+                .filter(counts)
+                .map(|i| pixel(self.image, i) - pixel(self.reference, i))
+        };
         let n = differences().count() as f64;
         let mean = differences().sum::<f64>() / n;
         let squares: f64 = differences().map(|d| (d - mean).powi(2)).sum();
@@ -144,7 +147,8 @@ impl<'a> ImagePair<'a> {
     /// The Tanimoto coefficient a.b / (|a|^2 + |b|^2 - a.b) of the images as vectors; 1 for two
     /// black images.
     pub fn tanimoto(&self) -> f64 {
-        let (ab, aa, bb) = self.values().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (a, b)| (ab + a * b, aa + a * a, bb + b * b));
+        let (ab, aa, bb) =
+            self.values().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (a, b)| (ab + a * b, aa + a * a, bb + b * b));
         let x = if aa == 0.0 && bb == 0.0 { 1.0 } else { ab / (aa + bb - ab) };
         if self.count() == 0 { f64::NAN } else { self.guarded(x) }
     }

@@ -177,7 +177,13 @@ pub fn judge_closest_ray(oracle: &Oracle, ray: &Ray, hit: &Hit, truth: &OracleHi
 
 /// Judges a tracer's closest hits. `truth` are the oracle's for the same rays
 /// ([`Oracle::trace_closest`]). Surplus entries of the longer slices are ignored.
-pub fn judge_closest(oracle: &Oracle, rays: &[Ray], hits: &[Hit], truth: &[OracleHit], rounding: Rounding) -> ParityReport {
+pub fn judge_closest(
+    oracle: &Oracle,
+    rays: &[Ray],
+    hits: &[Hit],
+    truth: &[OracleHit],
+    rounding: Rounding,
+) -> ParityReport {
     report(rays.len().min(hits.len()).min(truth.len()), |i| {
         let verdict = judge_closest_ray(oracle, &rays[i], &hits[i], &truth[i], rounding);
         (verdict, relative_difference(hits[i].t as f64, truth[i].t), Example::from_ray(i, rays, hits[i], truth[i]))
@@ -189,8 +195,12 @@ pub fn judge_closest(oracle: &Oracle, rays: &[Ray], hits: &[Hit], truth: &[Oracl
 pub fn judge_pair(oracle: &Oracle, rays: &[Ray], hits: &[Hit], others: &[Hit], rounding: Rounding) -> ParityReport {
     report(rays.len().min(hits.len()).min(others.len()), |i| {
         let (a, b) = (hits[i], others[i]);
-        let other =
-            OracleHit { t: b.t as f64, instance: b.instance, primitive: b.primitive, barycentrics: [b.u as f64, b.v as f64] };
+        let other = OracleHit {
+            t: b.t as f64,
+            instance: b.instance,
+            primitive: b.primitive,
+            barycentrics: [b.u as f64, b.v as f64],
+        };
         let verdict = match judge_closest_ray(oracle, &rays[i], &a, &other, rounding) {
             // a tie only says that `a` is admissible
             RayVerdict::Tie => match is_admissible(oracle, &OracleRay::from(&rays[i]), &b, rounding) {

@@ -84,7 +84,8 @@ mod tests {
 
     #[test]
     fn plain_accumulation_is_timed_between_late_frames() {
-        let at = |frames: u32, first: usize| (0..frames).filter(|f| is_plain_timed(*f, first, frames)).collect::<Vec<_>>();
+        let at =
+            |frames: u32, first: usize| (0..frames).filter(|f| is_plain_timed(*f, first, frames)).collect::<Vec<_>>();
         assert_eq!(at(96, 48), [48, 60, 72, 84]);
         assert_eq!(at(8, 0), [0, 2, 4, 6]);
         assert_eq!(at(4, 2), [2, 3]);

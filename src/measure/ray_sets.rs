@@ -87,8 +87,8 @@ pub fn ao_rays(oracle: &Oracle, rays: &[Ray], hits: &[OracleHit], per_hit: u32, 
             let ray = OracleRay::from(&rays[i]);
             let normal = oracle.facing_normal(&ray, &hits[i]);
             let point = ray.at(hits[i].t);
-            let origin =
-                point + normal * (16.0 * f32::EPSILON as f64 * point.abs().max_element().max(ray.origin.abs().max_element()));
+            let origin = point
+                + normal * (16.0 * f32::EPSILON as f64 * point.abs().max_element().max(ray.origin.abs().max_element()));
             (0..per_hit).map(move |s| {
                 let u = sampler.get_2d_unit([i as u32, 0], s, AO_DIRECTION);
                 let d = warp::to_world(normal.as_vec3().to_array(), warp::cosine_hemisphere(u));

@@ -103,7 +103,9 @@ pub fn judge(before: &Values, now: &Values, more_is_better: bool) -> Judged {
 /// The difference that chance makes; `None` where that is unknown.
 fn noise(before: &Values, now: &Values) -> Option<f64> {
     match (before, now) {
-        (Values::Repeated(a), Values::Repeated(b)) => Some(STANDARD_ERRORS * a.standard_error()?.hypot(b.standard_error()?)),
+        (Values::Repeated(a), Values::Repeated(b)) => {
+            Some(STANDARD_ERRORS * a.standard_error()?.hypot(b.standard_error()?))
+        }
         _ => Some(0.0),
     }
 }
@@ -177,7 +179,8 @@ mod tests {
         for (repeats, most) in [(3, 0.005), (7, 0.001), (32, 0.0002)] {
             let mut run = || {
                 // twelve uniform numbers: nearly normal
-                let values: Vec<f64> = (0..repeats).map(|_| 10.0 + (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect();
+                let values: Vec<f64> =
+                    (0..repeats).map(|_| 10.0 + (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect();
                 repeated(&values)
             };
             let runs = 20_000;

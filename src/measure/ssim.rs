@@ -62,7 +62,8 @@ pub fn ssim(pair: &ImagePair, width: usize) -> Result<Option<f64>> {
 
 /// The Gaussian window along one axis; its weights add up to 1.
 fn window() -> [f64; 2 * RADIUS + 1] {
-    let weights: [f64; 2 * RADIUS + 1] = std::array::from_fn(|k| (-0.5 * ((k as f64 - RADIUS as f64) / SIGMA).powi(2)).exp());
+    let weights: [f64; 2 * RADIUS + 1] =
+        std::array::from_fn(|k| (-0.5 * ((k as f64 - RADIUS as f64) / SIGMA).powi(2)).exp());
     let sum: f64 = weights.iter().sum();
     weights.map(|w| w / sum)
 }

@@ -100,8 +100,9 @@ impl Estimate {
         for region in regions {
             let pixels = region.pixels(self.size[0]);
             let count = region.count() as f64;
-            means
-                .extend((0..self.channels).map(|c| pixels.clone().map(|p| values[self.channels * p + c]).sum::<f64>() / count));
+            means.extend(
+                (0..self.channels).map(|c| pixels.clone().map(|p| values[self.channels * p + c]).sum::<f64>() / count),
+            );
         }
         means
     }
@@ -223,7 +224,8 @@ impl Reference {
         };
         let mut samples = mean_of(&|r| &r.samples);
         samples.iter_mut().for_each(|n| *n *= count);
-        let estimate = Estimate { mean: mean_of(&|r| &r.mean), variance: mean_of(&|r| &r.variance), samples, ..first.clone() };
+        let estimate =
+            Estimate { mean: mean_of(&|r| &r.mean), variance: mean_of(&|r| &r.variance), samples, ..first.clone() };
         let variances = |regions: &[Region]| -> Vec<f64> {
             let means: Vec<Vec<f64>> = renders.iter().map(|r| r.means_over(&r.mean, regions)).collect();
             let variance = |k: usize| {
@@ -311,8 +313,9 @@ impl ZTest {
         let scores = pixel_scores(image, known, &rounding)?;
         let differences: Vec<f64> = image.mean.iter().zip(&known.mean).map(|(a, b)| a - b).collect();
         let at_pixel = |k: usize| [k / known.channels % known.size[0], k / known.channels / known.size[0]];
-        let pixels =
-            extreme(Scale::Pixel, &scores, f64::INFINITY, known.channels, |k| (at_pixel(k), differences[k], known.mean[k]));
+        let pixels = extreme(Scale::Pixel, &scores, f64::INFINITY, known.channels, |k| {
+            (at_pixel(k), differences[k], known.mean[k])
+        });
 
         let surplus = surplus(image, known);
         let freedom = f64::from(reference.replicates) - 1.0;

@@ -85,7 +85,13 @@ impl Bvh {
 
     /// Calls `visit` for every primitive whose box, widened by `pad`, the ray meets within
     /// `(tmin, limit)`; `visit` returns a parameter beyond which nothing matters any more.
-    pub(super) fn visit(&self, ray: &OracleRay, pad: f64, limit: f64, mut visit: impl FnMut(u32) -> ControlFlow<(), f64>) {
+    pub(super) fn visit(
+        &self,
+        ray: &OracleRay,
+        pad: f64,
+        limit: f64,
+        mut visit: impl FnMut(u32) -> ControlFlow<(), f64>,
+    ) {
         // the entry of a box, and whether the ray meets it before the limit
         let inverse = ray.direction.recip();
         // NaN (a zero direction component on the slab's plane) is ignored by min and max: the slab

@@ -72,7 +72,8 @@ pub struct OracleHit {
 
 impl OracleHit {
     /// The record of a miss.
-    pub const MISS: OracleHit = OracleHit { t: f64::INFINITY, instance: u32::MAX, primitive: u32::MAX, barycentrics: [0.0; 2] };
+    pub const MISS: OracleHit =
+        OracleHit { t: f64::INFINITY, instance: u32::MAX, primitive: u32::MAX, barycentrics: [0.0; 2] };
 
     /// Is it a hit?
     pub fn is_hit(&self) -> bool {
@@ -140,7 +141,8 @@ impl Oracle {
             };
             match scene.meshes.get(instance.mesh).map(|m| &m.geometry) {
                 Some(Geometry::Triangles(mesh)) => {
-                    let points: Vec<_> = mesh.positions.iter().map(|p| to_world.transform_point3(p.as_dvec3())).collect();
+                    let points: Vec<_> =
+                        mesh.positions.iter().map(|p| to_world.transform_point3(p.as_dvec3())).collect();
                     entry.first = triangles.len() as u32;
                     entry.count = mesh.indices.len() as u32;
                     triangles.extend((0u32..).zip(&mesh.indices).map(|(primitive, corners)| {
@@ -297,7 +299,8 @@ impl Oracle {
             }
             None => {
                 let sphere = &self.spheres[index as usize - self.triangles.len()];
-                let hit = |t| OracleHit { t, instance: sphere.instance, primitive: sphere.primitive, barycentrics: [0.0; 2] };
+                let hit =
+                    |t| OracleHit { t, instance: sphere.instance, primitive: sphere.primitive, barycentrics: [0.0; 2] };
                 let present = self.instances[sphere.instance as usize]
                     .alpha
                     .as_ref()

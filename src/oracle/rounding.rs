@@ -94,7 +94,8 @@ impl Oracle {
         primitive: u32,
         rounding: Rounding,
     ) -> impl Iterator<Item = Candidate> + use<> {
-        let found = self.index_of(instance, primitive).map_or([Candidate::NEVER; 2], |i| self.candidates_of(i, ray, rounding));
+        let found =
+            self.index_of(instance, primitive).map_or([Candidate::NEVER; 2], |i| self.candidates_of(i, ray, rounding));
         found.into_iter().filter(Candidate::is_possible)
     }
 
@@ -133,7 +134,13 @@ impl Oracle {
     /// closely), and by how much each may be off, in a tracer's hit: a displacement of `delta`
     /// changes a weight by `delta` over the height that the triangle shows along the ray. `None`
     /// for a sphere and for what does not exist.
-    pub fn weights(&self, ray: &OracleRay, instance: u32, primitive: u32, rounding: Rounding) -> Option<([f64; 3], [f64; 3])> {
+    pub fn weights(
+        &self,
+        ray: &OracleRay,
+        instance: u32,
+        primitive: u32,
+        rounding: Rounding,
+    ) -> Option<([f64; 3], [f64; 3])> {
         let triangle = self.triangles.get(self.index_of(instance, primitive)? as usize)?;
         let (delta, flat) = self.as_seen(triangle, ray, rounding);
         let [v, w] = triangle.intersect(ray).map_or_else(|| clamped_barycentrics(&flat), |(_, b)| b);

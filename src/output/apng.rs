@@ -78,8 +78,10 @@ impl ApngWriter {
         let Animation { size: [width, height], colour, frames, delay } = animation;
         check_size(width, height)?;
         if frames == 0 || delay.denominator == 0 {
-            let what =
-                format!("{}: an animation needs at least one frame, and a delay with a denominator above 0", path.display());
+            let what = format!(
+                "{}: an animation needs at least one frame, and a delay with a denominator above 0",
+                path.display()
+            );
             return Err(Error::Usage(what));
         }
         let mut file = AtomicFile::create(path)?;
@@ -116,7 +118,9 @@ impl ApngWriter {
     pub fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
         let Animation { size: [width, height], colour, frames, .. } = self.animation;
         if bytes.len() as u64 != u64::from(width) * u64::from(height) * colour.channels() as u64 {
-            return Err(self.wrong(&format!("a frame of {} values for {width}x{height} {colour:?} pixels", bytes.len())));
+            return Err(
+                self.wrong(&format!("a frame of {} values for {width}x{height} {colour:?} pixels", bytes.len()))
+            );
         }
         if self.added == frames {
             return Err(self.wrong(&format!("one frame more than the {frames} it was to have")));

@@ -28,8 +28,8 @@ pub fn decode(bytes: &[u8], format: ImageFormat, max: MaxSize) -> Result<Dynamic
         return Err(ENDS_EARLY.to_owned());
     }
     // decoders say many things of a file that ends in its header
-    let image =
-        decode_as_is(bytes, format, max).map_err(|e| if lacks_end(bytes, format) { ENDS_EARLY.to_owned() } else { e })?;
+    let image = decode_as_is(bytes, format, max)
+        .map_err(|e| if lacks_end(bytes, format) { ENDS_EARLY.to_owned() } else { e })?;
     let again = |bytes: &[u8]| decode_as_is(bytes, format, max).ok();
     if format == ImageFormat::Jpeg && is_jpeg_cut_off(bytes, again) {
         return Err(ENDS_EARLY.to_owned());
@@ -149,7 +149,8 @@ mod tests {
     }
 
     fn encoded(format: ImageFormat) -> Vec<u8> {
-        let image = image::RgbImage::from_fn(61, 43, |x, y| image::Rgb([(x * y) as u8, (x * 4) as u8, (y * 37 % 256) as u8]));
+        let image =
+            image::RgbImage::from_fn(61, 43, |x, y| image::Rgb([(x * y) as u8, (x * 4) as u8, (y * 37 % 256) as u8]));
         let mut bytes = Cursor::new(Vec::new());
         image.write_to(&mut bytes, format).unwrap();
         bytes.into_inner()

@@ -14,12 +14,13 @@ use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::math::{RoundingMode, Vec2};
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LevelMode, LineOrder, Matrix4x4, SampleType, Text,
+    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LevelMode, LineOrder, Matrix4x4, SampleType,
+    Text,
 };
 use exr::meta::{MetaData, header::Header};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers,
-    WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels,
+    ReadLayers, WritableImage, f16,
 };
 
 use super::decode::ENDS_EARLY;
@@ -126,11 +127,13 @@ pub fn write_with(image: &Image, path: &Path, options: &ExrOptions) -> Result<()
 }
 
 fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()> {
-    let stored = |name: &str, samples| AnyChannel::new(text(name), Borrowed { samples, half: options.half && is_half(name) });
+    let stored =
+        |name: &str, samples| AnyChannel::new(text(name), Borrowed { samples, half: options.half && is_half(name) });
     let mut channels: exr::prelude::SmallVec<_> = image.channels.iter().map(|c| stored(&c.name, &c.samples)).collect();
     let is_free = |name: &&str| image.channels.iter().all(|c| c.name != **name);
     let rgb = ["R", "G", "B"];
-    if let (true, Some(grey)) = (options.grey_as_rgb && rgb.iter().all(is_free), image.channels.iter().find(|c| c.name == "Y"))
+    if let (true, Some(grey)) =
+        (options.grey_as_rgb && rgb.iter().all(is_free), image.channels.iter().find(|c| c.name == "Y"))
     {
         channels.extend(rgb.iter().map(|name| stored(name, &grey.samples)));
     }
@@ -144,8 +147,11 @@ fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()
         }
     }
     // blocks in order of their rows, whichever thread finishes first: the bytes are always the same
-    let encoding =
-        Encoding { compression: options.compression.into(), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let encoding = Encoding {
+        compression: options.compression.into(),
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
     let size = (image.width as usize, image.height as usize);
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let mut file_image = exr::image::Image::from_layer(layer);
@@ -327,7 +333,8 @@ fn has_block_that_is_too_large(file: Cursor<&[u8]>, meta: &MetaData) -> exr::err
         let Some(header) = meta.headers.get(chunk.layer_index).filter(|h| has_sizes(h)) else { continue };
         let (size, bytes) = match &chunk.compressed_block {
             CompressedBlock::ScanLine(block) => {
-                let from_top = block.y_coordinate.saturating_sub(header.own_attributes.layer_position.1).max(0) as usize;
+                let from_top =
+                    block.y_coordinate.saturating_sub(header.own_attributes.layer_position.1).max(0) as usize;
                 let lines = header.compression.scan_lines_per_block().min(header.layer_size.1.saturating_sub(from_top));
                 (Vec2(header.layer_size.0, lines), &block.compressed_pixels_le)
             }
@@ -409,7 +416,8 @@ impl Window {
 fn check_windows(meta: &MetaData) -> std::result::Result<(), String> {
     let (mut padding, mut is_shown) = (0, false);
     for header in &meta.headers {
-        let (data, display) = (Window::from(header.data_window()), Window::from(header.shared_attributes.display_window));
+        let (data, display) =
+            (Window::from(header.data_window()), Window::from(header.shared_attributes.display_window));
         for (name, window) in [("data", data), ("display", display)] {
             if window.pixels() == 0 || window.pixels() > u128::from(super::MAX_PIXELS) {
                 return Err(format!("an image of {} x {} pixels ({name} window)", window.size.0, window.size.1));
@@ -446,7 +454,9 @@ fn check_windows(meta: &MetaData) -> std::result::Result<(), String> {
 fn decode(path: &Path, budget: &Budget) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
-        exr::error::Error::NotSupported(m) => Error::input(path, format!("an EXR of a kind that is not supported: {m}")),
+        exr::error::Error::NotSupported(m) => {
+            Error::input(path, format!("an EXR of a kind that is not supported: {m}"))
+        }
         // what the decoder says of a file that ends early
         exr::error::Error::Invalid(m) if m == "reference to missing bytes" => Error::input(path, ENDS_EARLY),
         e => Error::input(path, format!("not a readable EXR: {e}")),
@@ -458,22 +468,29 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
     check_windows(&meta).map_err(|message| Error::input(path, message))?;
     let bytes = data.len() as u64;
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
-        return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
+        return Err(Error::input(
+            path,
+            format!("not a readable EXR: {bytes} bytes are too few for what its header says"),
+        ));
     }
     budget.read(usize::try_from(bytes).unwrap_or(usize::MAX));
     for header in &meta.headers {
-        let [data, display] = [header.data_window(), header.shared_attributes.display_window].map(|w| Window::from(w).pixels());
-        let bytes =
-            |pixels: u128| u64::try_from(pixels.saturating_mul(4 * header.channels.list.len() as u128)).unwrap_or(u64::MAX);
+        let [data, display] =
+            [header.data_window(), header.shared_attributes.display_window].map(|w| Window::from(w).pixels());
+        let bytes = |pixels: u128| {
+            u64::try_from(pixels.saturating_mul(4 * header.channels.list.len() as u128)).unwrap_or(u64::MAX)
+        };
         let size = Window::from(header.data_window()).size;
         // as they are shown, and before that as they are read
-        let taken = budget.take_for_now(bytes(display), bytes(data), || format!("an image of {}x{} pixels", size.0, size.1));
+        let taken =
+            budget.take_for_now(bytes(display), bytes(data), || format!("an image of {}x{} pixels", size.0, size.1));
         taken.or_else(|_| budget.check().map_err(|e| e.in_file(path)))?;
     }
     if has_block_that_is_too_large(open(), &meta).map_err(broken)? {
         return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));
     }
-    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    let reader =
+        exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     // a panic in one of the decoder's threads ends the process, and damaged blocks are not checked
     let is_simple = |h: &Header| {
         matches!(h.compression, Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16)
@@ -489,18 +506,24 @@ fn decode(path: &Path, budget: &Budget) -> Result<Image> {
     let ours = file.layer_data.iter().all(|layer| is_ours(&layer.attributes));
     for layer in file.layer_data {
         let data = Window { position: layer.attributes.layer_position, size: layer.size };
-        let prefix = layer.attributes.layer_name.as_ref().filter(|_| parts > 1).map(|n| string(n) + ".").unwrap_or_default();
+        let prefix =
+            layer.attributes.layer_name.as_ref().filter(|_| parts > 1).map(|n| string(n) + ".").unwrap_or_default();
         for channel in layer.channel_data.list {
             let samples = match channel.sample_data {
-                FlatSamples::F16(s) => Samples::F32(data.shown_in(display, s.into_iter().map(|v| v.to_f32()).collect())),
+                FlatSamples::F16(s) => {
+                    Samples::F32(data.shown_in(display, s.into_iter().map(|v| v.to_f32()).collect()))
+                }
                 FlatSamples::F32(s) => Samples::F32(data.shown_in(display, s)),
                 FlatSamples::U32(s) => Samples::U32(data.shown_in(display, s)),
             };
             image.channels.push(Channel { name: prefix.clone() + &string(&channel.name), samples });
         }
+        let matrices = [
+            (WORLD_TO_CAMERA, layer.attributes.world_to_camera),
+            (WORLD_TO_NDC, layer.attributes.world_to_normalized_device),
+        ];
         let matrices =
-            [(WORLD_TO_CAMERA, layer.attributes.world_to_camera), (WORLD_TO_NDC, layer.attributes.world_to_normalized_device)];
-        let matrices = matrices.iter().filter_map(|(key, matrix)| Some(((*key).to_owned(), matrix_text(matrix.as_ref()?))));
+            matrices.iter().filter_map(|(key, matrix)| Some(((*key).to_owned(), matrix_text(matrix.as_ref()?))));
         image.metadata.extend(matrices);
         for (key, value) in layer.attributes.other.iter().chain(&file.attributes.other) {
             if let (Some(key), AttributeValue::Text(value)) = (string(key).strip_prefix(PREFIX), value) {
@@ -601,7 +624,8 @@ mod tests {
         for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
             // blocks that are not a multiple of eight pixels, and the last one is not whole
             let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-            let colours = SpecificChannels::rgb(|at: Vec2<usize>| (at.x() as f32 / 41.0, at.y() as f32 / 300.0, 0.5_f32));
+            let colours =
+                SpecificChannels::rgb(|at: Vec2<usize>| (at.x() as f32 / 41.0, at.y() as f32 / 300.0, 0.5_f32));
             let layer = Layer::new((41, 300), LayerAttributes::named("colours"), encoding, colours);
             exr::prelude::Image::from_layer(layer).write().to_file(&path).unwrap();
             let image = read(&path).unwrap();

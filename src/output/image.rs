@@ -71,11 +71,21 @@ impl Image {
     pub(super) fn check(&self) -> Result<()> {
         let bad = |what: String| Err(Error::Usage(what));
         if self.pixel_count() == 0 || self.channels.is_empty() {
-            return bad(format!("an image of {} x {} pixels and {} channels", self.width, self.height, self.channels.len()));
+            return bad(format!(
+                "an image of {} x {} pixels and {} channels",
+                self.width,
+                self.height,
+                self.channels.len()
+            ));
         }
         for (i, c) in self.channels.iter().enumerate() {
             if c.samples.len() != self.pixel_count() {
-                return bad(format!("channel {:?} has {} samples for {} pixels", c.name, c.samples.len(), self.pixel_count()));
+                return bad(format!(
+                    "channel {:?} has {} samples for {} pixels",
+                    c.name,
+                    c.samples.len(),
+                    self.pixel_count()
+                ));
             }
             // 255 is the limit of the EXR format
             if c.name.is_empty() || c.name.len() > 255 || self.channels[..i].iter().any(|d| d.name == c.name) {

@@ -190,7 +190,9 @@ impl Picture {
             Colour::Rgba => ExtendedColorType::Rgba8,
         };
         match format {
-            ImageFormat::Exr | ImageFormat::Png => return wrong("not a picture: the name must end in .png, .jpg or .webp"),
+            ImageFormat::Exr | ImageFormat::Png => {
+                return wrong("not a picture: the name must end in .png, .jpg or .webp");
+            }
             ImageFormat::Jpeg if self.colour.has_alpha() => return wrong("JPEG has no alpha; write a .png or .webp"),
             ImageFormat::Jpeg if self.width > u16::MAX.into() || self.height > u16::MAX.into() => {
                 return wrong("JPEG has sides of up to 65535 pixels; write a .png");

@@ -178,7 +178,8 @@ pub fn read(path: &Path, budget: &Budget) -> Result<Image> {
 
     // Decodes the colours, and premultiplies them with alpha.
     let linear = |coded: f32| if is_linear { coded } else { srgb_decode(coded) };
-    let alpha: Option<Vec<f32>> = decoded.color().has_alpha().then(|| decoded.to_rgba32f().pixels().map(|p| p.0[3]).collect());
+    let alpha: Option<Vec<f32>> =
+        decoded.color().has_alpha().then(|| decoded.to_rgba32f().pixels().map(|p| p.0[3]).collect());
     let channel = |name: &str, mut samples: Vec<f32>| {
         if let Some(alpha) = &alpha {
             samples.par_iter_mut().zip(alpha).for_each(|(v, a)| *v *= *a);

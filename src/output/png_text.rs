@@ -18,7 +18,9 @@ const MAX_KEYWORD: usize = 79;
 /// [`Error::Usage`] for an image without colour or a key that is too long, [`Error::Output`].
 pub fn write(image: &Image, path: &Path) -> Result<()> {
     let (bytes, colour) = bytes_of(image, 0.0, path)?;
-    if let Some((key, _)) = image.metadata.iter().find(|(key, _)| key.is_empty() || PREFIX.len() + key.len() > MAX_KEYWORD) {
+    if let Some((key, _)) =
+        image.metadata.iter().find(|(key, _)| key.is_empty() || PREFIX.len() + key.len() > MAX_KEYWORD)
+    {
         return Err(Error::Usage(format!("metadata key {key:?} is empty or too long for a PNG")));
     }
     write_atomically(path, |file| {
@@ -65,7 +67,8 @@ mod tests {
         let plane = |name: &str, v: f32| Channel { name: name.into(), samples: Samples::F32(vec![v, 0.0, 0.5, 1.0]) };
         let metadata =
             [("driver", "Mesa 25 (LLVM)"), ("scene", "Größe.glb")].map(|(k, v)| (k.to_owned(), v.to_owned())).to_vec();
-        let image = Image { width: 2, height: 2, channels: vec![plane("B", 0.1), plane("G", 0.7), plane("R", 0.2)], metadata };
+        let image =
+            Image { width: 2, height: 2, channels: vec![plane("B", 0.1), plane("G", 0.7), plane("R", 0.2)], metadata };
         write(&image, &path).unwrap();
         assert_eq!(read_metadata(&path).unwrap(), image.metadata);
         let back = png::read(&path, &crate::memory::Budget::default()).unwrap();

@@ -140,8 +140,11 @@ impl Header {
 /// Positive numbers of a line.
 fn numbers<const N: usize>(line: &str, text: &str) -> Result<[f64; N], String> {
     let values: Vec<f64> = text.split_whitespace().filter_map(|n| n.parse().ok()).collect();
-    let values: Option<[f64; N]> = values.try_into().ok().filter(|v: &[f64; N]| v.iter().all(|n| n.is_finite() && *n > 0.0));
-    values.ok_or_else(|| format!("has a line {:?} in its header, in which {N} numbers above 0 are missing", shortened(line)))
+    let values: Option<[f64; N]> =
+        values.try_into().ok().filter(|v: &[f64; N]| v.iter().all(|n| n.is_finite() && *n > 0.0));
+    values.ok_or_else(|| {
+        format!("has a line {:?} in its header, in which {N} numbers above 0 are missing", shortened(line))
+    })
 }
 
 fn shortened(line: &str) -> String {

@@ -130,7 +130,8 @@ impl FileSettings {
 
     /// Do they ask for PNG files of other values than 8-bit sRGB?
     pub fn has_deep_png(&self) -> bool {
-        self.png_bits.unwrap_or_default() != PngBits::Eight || self.png_encoding.unwrap_or_default() != PngEncoding::Srgb
+        self.png_bits.unwrap_or_default() != PngBits::Eight
+            || self.png_encoding.unwrap_or_default() != PngEncoding::Srgb
     }
 
     /// Checks that each setting has an effect on one of these files and fits them all.
@@ -167,9 +168,11 @@ impl FileSettings {
             )));
         }
         match self.exr_compression {
-            Some(compression @ (ExrCompression::B44 | ExrCompression::B44a)) if !self.exr_half => Err(Error::Usage(format!(
-                "--exr-compression {compression} compresses 16-bit floats only: add --exr-half, or choose zip or piz"
-            ))),
+            Some(compression @ (ExrCompression::B44 | ExrCompression::B44a)) if !self.exr_half => {
+                Err(Error::Usage(format!(
+                    "--exr-compression {compression} compresses 16-bit floats only: add --exr-half, or choose zip or piz"
+                )))
+            }
             _ => Ok(()),
         }
     }
@@ -201,9 +204,24 @@ mod tests {
         let none = FileSettings::default();
         let cases = [
             (FileSettings { png_bits: Some(PngBits::Sixteen), ..none.clone() }, "a.exr", "a.png", "--png-bits"),
-            (FileSettings { png_encoding: Some(PngEncoding::Linear), ..none.clone() }, "a.apng", "a.PNG", "--png-encoding"),
-            (FileSettings { background: Some(Background::Transparent), ..none.clone() }, "a.exr", "a.apng", "--background"),
-            (FileSettings { background: Some(Background::Transparent), ..none.clone() }, "a.jpeg", "a.webp", "--background"),
+            (
+                FileSettings { png_encoding: Some(PngEncoding::Linear), ..none.clone() },
+                "a.apng",
+                "a.PNG",
+                "--png-encoding",
+            ),
+            (
+                FileSettings { background: Some(Background::Transparent), ..none.clone() },
+                "a.exr",
+                "a.apng",
+                "--background",
+            ),
+            (
+                FileSettings { background: Some(Background::Transparent), ..none.clone() },
+                "a.jpeg",
+                "a.webp",
+                "--background",
+            ),
             (FileSettings { jpeg_quality: Some(3), ..none.clone() }, "a.webp", "a.jpg", "--jpeg-quality"),
             (FileSettings { exr_half: true, ..none.clone() }, "a.png", "a.exr", "--exr-half"),
             (

@@ -8,7 +8,8 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Parses an image size `WxH` in pixels.
 pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
-    let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
+    let side =
+        |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;
     let size = [side(w)?, side(h)?];
     check_size(size[0], size[1]).map_err(|e| e.to_string())?;

@@ -85,10 +85,12 @@ impl Plane {
         let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let (center, half) = (0.5 * (lo + hi), 0.5 * (hi - lo));
         let middle = normal.dot(center) + self.normal.dot(translation) + self.offset;
-        let terms =
-            row(0).abs() * self.normal.x.abs() + row(1).abs() * self.normal.y.abs() + row(2).abs() * self.normal.z.abs();
-        let rounding =
-            terms.dot(lo.abs().max(hi.abs())) + self.normal.abs().dot(translation.abs() + eye.abs()) + self.offset.abs();
+        let terms = row(0).abs() * self.normal.x.abs()
+            + row(1).abs() * self.normal.y.abs()
+            + row(2).abs() * self.normal.z.abs();
+        let rounding = terms.dot(lo.abs().max(hi.abs()))
+            + self.normal.abs().dot(translation.abs() + eye.abs())
+            + self.offset.abs();
         let reach = (1.0 + WIDENED) * normal.abs().dot(half) + ROUNDING * rounding;
         [middle - reach, middle + reach]
     }
@@ -120,8 +122,9 @@ impl Frustum {
         };
         let (x, y) = (side(right, 0, 1.0), side(up, 1, -1.0));
         let wide = view.block.size.map(|n| 1.0 + 2.0 * MARGIN / n as f64);
-        let kept =
-            |p: Plane, k: usize, sign: f64| Plane { normal: w.normal * wide[k], offset: w.offset * wide[k] }.plus(p, sign);
+        let kept = |p: Plane, k: usize, sign: f64| {
+            Plane { normal: w.normal * wide[k], offset: w.offset * wide[k] }.plus(p, sign)
+        };
         Ok(Self {
             eye: column(3).as_vec3(),
             turned: determinant < 0.0,

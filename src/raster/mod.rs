@@ -57,13 +57,19 @@ impl Primary {
     pub fn auto(tracer: &Tracer, pixels: u64) -> (Primary, String) {
         let info = &tracer.device().info;
         if !info.can_rasterise() {
-            return (Primary::Traced, format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")));
+            return (
+                Primary::Traced,
+                format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")),
+            );
         }
         let placed: u64 = tracer.raster_instances().map(|d| d.shape.primitives as u64).sum();
         let most = if info.is_cpu() { PRIMITIVES_PER_PIXEL.0 } else { PRIMITIVES_PER_PIXEL.1 };
         let share = placed as f64 / pixels.max(1) as f64;
         let primary = if share > most { Primary::Traced } else { Primary::Raster };
-        (primary, format!("{share:.2} primitives per pixel; up to {most}, this device rasterizes faster than it traces"))
+        (
+            primary,
+            format!("{share:.2} primitives per pixel; up to {most}, this device rasterizes faster than it traces"),
+        )
     }
 }
 

@@ -51,7 +51,8 @@ impl FrameSamples {
         let few = settings.rays_per_pixel;
         let most_paths = if is_cpu { FIRST_PATHS } else { FIRST_GPU_PATHS };
         let per_pixel = |paths: u64, most: u64| (paths / pixels.max(1)).min(most) as u32;
-        let many = if settings.converges() { few.max(power_of_two(per_pixel(most_paths, FIRST_PER_PIXEL))) } else { few };
+        let many =
+            if settings.converges() { few.max(power_of_two(per_pixel(most_paths, FIRST_PER_PIXEL))) } else { few };
         let grows = settings.converges() && settings.resolution.period() == 1;
         // several paths of a short frame after the first at rest lie anywhere in their pixels
         let forgets_short = many >= 4 && (few == 1 || grows);
@@ -203,7 +204,8 @@ mod tests {
                 let settings = Settings { converge: true, ..settings };
                 for samples in all(&settings) {
                     assert!(samples.many >= samples.few);
-                    let few_or = |most: u64| samples.most() == samples.few || u64::from(samples.most()) * pixels <= most;
+                    let few_or =
+                        |most: u64| samples.most() == samples.few || u64::from(samples.most()) * pixels <= most;
                     assert!(few_or(1 << 26));
                     let (mut sum, mut in_long) = (0, 0);
                     for resting in 1..100 {
@@ -249,7 +251,10 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.in_frame(resting)), [4, 4, 4, 8, 8, 32]);
         // a GPU has time for several paths in a large image
         let large = |is_cpu| FrameSamples::for_radiance(&settings, 1920 * 1080, is_cpu);
-        assert_eq!([large(true).in_frame(4), large(false).in_frame(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
+        assert_eq!(
+            [large(true).in_frame(4), large(false).in_frame(4), large(true).most(), large(false).most()],
+            [1, 8, 2, 32]
+        );
         // all pixels of a pattern have the same number
         let half = FrameSamples::for_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
         assert_eq!([3, 4, 100].map(|resting| half.in_frame(resting)), [1, 8, 8]);

@@ -212,7 +212,10 @@ impl FrameSettings {
             let numbered = frames::is_pattern(path)?;
             if apng::is_apng(path) {
                 if numbered {
-                    return Err(Error::Usage(format!("{}: an animation holds all frames; leave out the #", path.display())));
+                    return Err(Error::Usage(format!(
+                        "{}: an animation holds all frames; leave out the #",
+                        path.display()
+                    )));
                 }
             } else if range.end - range.first > 1 && !numbered {
                 return Err(Error::Usage(format!(

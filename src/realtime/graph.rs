@@ -347,9 +347,9 @@ impl Graph {
             let counted = self.ray_count.as_ref().filter(|_| rest.is_empty()).zip(resources.buffer(Resource::RayCount));
             timings.extend(self.commands.run(|r| {
                 let mut hazards = Hazards::default();
-                outcome = submission
-                    .iter()
-                    .try_for_each(|&(stage, k)| record_range(r, frame, resources, &mut hazards, &self.stages[stage], k));
+                outcome = submission.iter().try_for_each(|&(stage, k)| {
+                    record_range(r, frame, resources, &mut hazards, &self.stages[stage], k)
+                });
                 if let Some((to, from)) = counted {
                     r.barrier();
                     r.copy(from, 0, to, 0, 4);
@@ -415,7 +415,8 @@ impl Hazards {
 
     fn conflicts(&self, reads: &[Option<usize>], writes: &[Option<usize>]) -> bool {
         let is_in = |all: &[usize], k: &Option<usize>| k.is_some_and(|k| all.contains(&k));
-        reads.iter().any(|k| is_in(&self.written, k)) || writes.iter().any(|k| is_in(&self.written, k) || is_in(&self.read, k))
+        reads.iter().any(|k| is_in(&self.written, k))
+            || writes.iter().any(|k| is_in(&self.written, k) || is_in(&self.read, k))
     }
 }
 
@@ -448,7 +449,14 @@ impl<T: bytemuck::NoUninit> Params<T> {
     }
 
     /// Records a compute pipeline with one invocation per element of `range`.
-    pub fn dispatch(&self, r: &mut Recorder, label: &'static str, pipeline: &ComputePipeline, frame: &Frame, range: Range) {
+    pub fn dispatch(
+        &self,
+        r: &mut Recorder,
+        label: &'static str,
+        pipeline: &ComputePipeline,
+        frame: &Frame,
+        range: Range,
+    ) {
         self.dispatch_strips(r, label, pipeline, frame, range, 1);
     }
 
@@ -476,7 +484,11 @@ mod tests {
     fn hazards_are_writes_before_uses() {
         let hazards = Hazards { read: vec![1], written: vec![2] };
         assert!(!hazards.conflicts(&[Some(1), Some(3), None], &[Some(3), None]));
-        assert!(hazards.conflicts(&[Some(2)], &[]) && hazards.conflicts(&[], &[Some(1)]) && hazards.conflicts(&[], &[Some(2)]));
+        assert!(
+            hazards.conflicts(&[Some(2)], &[])
+                && hazards.conflicts(&[], &[Some(1)])
+                && hazards.conflicts(&[], &[Some(2)])
+        );
     }
 
     #[test]

@@ -216,7 +216,8 @@ impl RestProgress {
         let is_undisturbed = !history.has_new_light && !history.was_interrupted;
         let is_still = !has_moved && inputs.signal.has_pixel_histories() && is_undisturbed;
         let begins_at_rest = !history.has_resolved && inputs.signal.begins_at_rest(samples);
-        let resting = if is_still { history.motion.frames_at_rest().saturating_add(1) } else { u32::from(begins_at_rest) };
+        let resting =
+            if is_still { history.motion.frames_at_rest().saturating_add(1) } else { u32::from(begins_at_rest) };
         Self {
             motion: Motion::from_frames_at_rest(resting),
             is_still,

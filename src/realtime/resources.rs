@@ -358,7 +358,11 @@ impl Resources {
     }
 
     /// Reads back `count` records; none if no pass writes the resource.
-    pub fn read<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, resource: Resource, count: u64) -> Result<Vec<T>> {
+    pub fn read<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+        &self,
+        resource: Resource,
+        count: u64,
+    ) -> Result<Vec<T>> {
         match self.buffer(resource) {
             Some(buffer) => Ok(bytemuck::pod_collect_to_vec(&buffer.read(0, count * size_of::<T>() as u64)?)),
             None => Ok(Vec::new()),

@@ -73,7 +73,8 @@ pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
     let by_index = wanted.parse::<usize>().ok().filter(|k| *k < all.len());
     by_index.or_else(|| all.iter().position(|a| a.name == wanted)).ok_or_else(|| {
         let names: Vec<_> = all.iter().enumerate().map(|(k, a)| format!("{k} '{}'", a.name)).collect();
-        let there = if names.is_empty() { "the scene has none".to_owned() } else { format!("it has {}", names.join(", ")) };
+        let there =
+            if names.is_empty() { "the scene has none".to_owned() } else { format!("it has {}", names.join(", ")) };
         Error::Usage(format!("--animate {wanted}: no such animation; {there}"))
     })
 }
@@ -85,8 +86,9 @@ pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
 pub fn moves_lights(scene: &Scene, rig: &AnimationRig, animation: usize) -> Result<bool> {
     let motion = rig.motion(animation)?;
     let moves = |k: usize, mesh: usize| motion.instances.contains(&k) || motion.meshes.contains(&mesh);
-    let emits =
-        |mesh: usize| scene.materials.get(scene.meshes[mesh].material).is_some_and(|m| m.emissive != Vec3::ZERO && !m.unlit);
+    let emits = |mesh: usize| {
+        scene.materials.get(scene.meshes[mesh].material).is_some_and(|m| m.emissive != Vec3::ZERO && !m.unlit)
+    };
     let moves_emitter = scene.instances.iter().enumerate().any(|(k, i)| moves(k, i.mesh) && emits(i.mesh));
     Ok(moves_emitter || !rig.moving_lights(animation)?.is_empty())
 }

@@ -246,7 +246,9 @@ impl Settings {
             return wrong("clamp, moved weight and filter samples must not be negative");
         }
         if self.antialias && self.technique == Technique::Larsen {
-            return wrong("--preset larsen has one sample place in a pixel: leave antialiasing out, or choose another preset");
+            return wrong(
+                "--preset larsen has one sample place in a pixel: leave antialiasing out, or choose another preset",
+            );
         }
         if self.bent && self.technique != Technique::Traced {
             return wrong("bent normals need traced directions: choose --technique traced");
@@ -266,8 +268,9 @@ impl Settings {
     /// # Errors
     /// [`Error::Usage`], naming the first that does not.
     pub fn check_radiance(&self) -> Result<()> {
-        let wrong =
-            |what: &str| Err(Error::Usage(format!("{what} is for ambient occlusion: leave it out, or use --integrator ao")));
+        let wrong = |what: &str| {
+            Err(Error::Usage(format!("{what} is for ambient occlusion: leave it out, or use --integrator ao")))
+        };
         match self {
             Settings { technique: Technique::Gtao, .. } => wrong("--technique gtao"),
             Settings { technique: Technique::Larsen, .. } => wrong("--preset larsen"),

@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn what_was_not_in_the_image_is_new() {
         let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        let camera = CameraRecord { camera_to_world: rows, view: [1.0, 1.0], orthographic: false, clip: [0.0, f32::INFINITY] };
+        let camera =
+            CameraRecord { camera_to_world: rows, view: [1.0, 1.0], orthographic: false, clip: [0.0, f32::INFINITY] };
         // pixels of a plane at distance 2: their middles are at -1, 1
         let before = [at([-1.0, 1.0, -2.0]), at([1.0, 1.0, -2.0]), at([-1.0, -1.0, -2.0]), at([1.0, -1.0, -20.0])];
         let (at_middle, footprint) = project([-1.0, 1.0, -2.0], &camera, [2, 2]).unwrap();

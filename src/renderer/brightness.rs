@@ -52,7 +52,9 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
         "the sky does not reach what the camera sees; --view chooses another camera"
     };
     match mean {
-        v if v < least => Some(format!("the image is all but black: surfaces in view are {:.1} % open; {darker}", 100.0 * v)),
+        v if v < least => {
+            Some(format!("the image is all but black: surfaces in view are {:.1} % open; {darker}", 100.0 * v))
+        }
         v if v > most => Some(format!(
             "the image is all but white: surfaces in view are {:.1} % open; \
              --view inside, --eye and --target look at another place{}",

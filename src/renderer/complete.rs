@@ -55,7 +55,8 @@ impl Renderer {
         let integrator = settings.integrator().get();
         let capabilities = integrator.capabilities();
         // what has ambient light is not black without another
-        let needs_light = capabilities.contains(&Capability::SceneLights) && !capabilities.contains(&Capability::AmbientLight);
+        let needs_light =
+            capabilities.contains(&Capability::SceneLights) && !capabilities.contains(&Capability::AmbientLight);
         // the light of a dark scene stays as long as it makes no difference: nothing is rebuilt
         let stays = self.lighting.is_automatic && is_default && (needs_light || !integrator.sees_environment());
         if !stays {
@@ -110,7 +111,9 @@ impl Renderer {
         if is_default && needs_light && (self.lighting.is_automatic || self.scene.is_dark()) {
             let (lighting, words) = light::choose(&survey, &camera, aspect)?;
             let options = options_text(&RenderSettings { lighting: lighting.clone(), ..Default::default() });
-            choices.push(format!("light: the scene has none and gets {words} ({options}); --environment none leaves it dark"));
+            choices.push(format!(
+                "light: the scene has none and gets {words} ({options}); --environment none leaves it dark"
+            ));
             chosen.lighting = lighting.clone();
             self.light(&lighting)?;
             self.lighting.is_automatic = true;
@@ -151,18 +154,24 @@ fn size_of_camera(settings: &RenderSettings, scene: &Scene) -> Option<([u32; 2],
     let aspect = settings.camera.scene_camera(scene)?.aspect?;
     let size = size_of_aspect(aspect).filter(|size| *size != DEFAULT_SIZE)?;
     let [width, height] = size;
-    Some((size, format!("image size: {width}x{height}, of the aspect ratio of the scene's camera, {:.4} (--size)", aspect)))
+    Some((
+        size,
+        format!("image size: {width}x{height}, of the aspect ratio of the scene's camera, {:.4} (--size)", aspect),
+    ))
 }
 
 /// A sentence on clipping planes that hide something, as far as the scene's bounds tell.
 fn clipped(camera: &Camera, survey: &Survey) -> Option<String> {
     let (lo, hi) = survey.bounds().ok().filter(|_| camera.clip != ClipPlanes::NONE)?;
     let to_camera = camera.camera_to_world.inverse();
-    let corner = |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    let corner =
+        |k: usize| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
     let farthest = (0..8).map(|k| -to_camera.transform_point3(corner(k)).z).fold(0.0, f64::max);
     // a near plane is usually there for rasterizers
     let hides = camera.clip.far < farthest || camera.clip.near > 1e-2 * survey.diagonal();
-    hides.then(|| format!("clipping: the camera sees from {} to {} scene units (--clip)", camera.clip.near, camera.clip.far))
+    hides.then(|| {
+        format!("clipping: the camera sees from {} to {} scene units (--clip)", camera.clip.near, camera.clip.far)
+    })
 }
 
 /// An AO radius, and what there is to say about it.

@@ -129,7 +129,8 @@ impl DefaultsFile {
 
     /// Checks that a file beside a scene has no settings but [`SCENE_SETTINGS`].
     fn check_scene_settings(&self) -> Result<()> {
-        let may = |key: &str| SCENE_SETTINGS.iter().any(|s| if s.ends_with('.') { key.starts_with(s) } else { key == *s });
+        let may =
+            |key: &str| SCENE_SETTINGS.iter().any(|s| if s.ends_with('.') { key.starts_with(s) } else { key == *s });
         let refused: Vec<_> = leaves(&self.settings, &self.device).into_keys().filter(|key| !may(key)).collect();
         if refused.is_empty() {
             return Ok(());
@@ -161,7 +162,8 @@ impl DefaultsFile {
 
     fn parse(path: &Path, text: &str) -> Result<Self> {
         let mut table = table(path, text)?;
-        let device = table.remove("device").map(|device| device.try_into()).transpose().map_err(|e| wrong(path, text, &e))?;
+        let device =
+            table.remove("device").map(|device| device.try_into()).transpose().map_err(|e| wrong(path, text, &e))?;
         let settings = settings(path, text, table)?;
         let mut file = Self { path: path.to_owned(), settings, device: device.unwrap_or_default() };
         file.resolve_paths();
@@ -239,7 +241,8 @@ pub fn resolve(
         let kept = holding_settings(&own, &resolved.settings, holds);
         let kept_device = holding_device(&file.device, &resolved.device);
         let is_new = |key: &String| !before.contains_key(key);
-        let mut taken: BTreeMap<_, _> = leaves(&kept, &kept_device).into_iter().filter(|(key, _)| is_new(key)).collect();
+        let mut taken: BTreeMap<_, _> =
+            leaves(&kept, &kept_device).into_iter().filter(|(key, _)| is_new(key)).collect();
         let offered = leaves(&own, &file.device).into_keys().filter(|key| is_new(key));
         let mut unused: Vec<_> = offered.filter(|key| !taken.contains_key(key)).collect();
         let integrator = file.settings.integrator.filter(|_| offers(file));
@@ -259,7 +262,11 @@ pub fn resolve(
 }
 
 /// The settings of `own` that hold together with those `above`, which replace them.
-fn holding_settings(own: &RenderSettings, above: &RenderSettings, holds: &dyn Fn(&RenderSettings) -> bool) -> RenderSettings {
+fn holding_settings(
+    own: &RenderSettings,
+    above: &RenderSettings,
+    holds: &dyn Fn(&RenderSettings) -> bool,
+) -> RenderSettings {
     if holds(&own.overridden_by(above)) {
         return own.clone();
     }
@@ -345,8 +352,10 @@ mod tests {
             "/u/skylit.toml",
             "integrator = \"path\"\n[image]\nspp = 4\nseed = 1\nsize = [64, 48]\n[integrators.ao]\nao_radius = 2",
         );
-        let scene =
-            file("/s/skylit.toml", "[image]\nspp = 8\nseed = 2\n[lighting]\nenvironment = \"sky.hdr\"\n[frames]\nhistory = 8");
+        let scene = file(
+            "/s/skylit.toml",
+            "[image]\nspp = 8\nseed = 2\n[lighting]\nenvironment = \"sky.hdr\"\n[frames]\nhistory = 8",
+        );
         let files = [user, scene];
         let r = resolved(&files, "--seed 3");
         let expected = words("path --spp 8 --seed 3 --size 64x48 --environment /s/sky.hdr");
@@ -377,8 +386,10 @@ mod tests {
 
     #[test]
     fn a_default_that_does_not_go_together_is_left_out() {
-        let files =
-            [file("/u/skylit.toml", "[camera]\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n[frames]\nhistory = 4\norbit = 9\n")];
+        let files = [file(
+            "/u/skylit.toml",
+            "[camera]\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n[frames]\nhistory = 4\norbit = 9\n",
+        )];
         let r = resolved(&files, "--camera 1");
         assert_eq!((r.settings.camera.camera.as_deref(), r.settings.camera.eye), (Some("1"), None));
         let r = resolved(&files, "fast --camera-path p.toml");
@@ -435,7 +446,10 @@ mod tests {
         ] {
             let error = DefaultsFile::parse(Path::new("dir/skylit.toml"), text).unwrap_err();
             let message = error.to_string();
-            assert!(message.starts_with("dir/skylit.toml: ") && message.contains(says) && !message.contains('\n'), "{message}");
+            assert!(
+                message.starts_with("dir/skylit.toml: ") && message.contains(says) && !message.contains('\n'),
+                "{message}"
+            );
             assert_eq!(error.exit_code(), 3);
         }
     }

@@ -41,7 +41,9 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
         SelectedDenoiser { denoiser: Denoiser::Oidn(oidn), summary: why.clone(), why }
     };
     Ok(Some(match choice {
-        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "requested".into(), summary: "requested".into() },
+        DenoiseChoice::Filter => {
+            SelectedDenoiser { denoiser: filter(), why: "requested".into(), summary: "requested".into() }
+        }
         DenoiseChoice::Oidn => oidn(Oidn::open()?),
         DenoiseChoice::Auto => match Oidn::open() {
             Ok(library) => oidn(library),

@@ -26,8 +26,11 @@ pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
         .enumerate()
         .map(|(k, word)| {
             let plane = state.plane(k);
-            let samples =
-                if word.float { Samples::F32(plane.into_iter().map(f32::from_bits).collect()) } else { Samples::U32(plane) };
+            let samples = if word.float {
+                Samples::F32(plane.into_iter().map(f32::from_bits).collect())
+            } else {
+                Samples::U32(plane)
+            };
             channel(&word.name, samples)
         })
         .collect();
@@ -155,7 +158,8 @@ mod tests {
     #[test]
     fn differing_metadata_is_named() {
         let metadata = [("seed", "1"), ("scene", "a.glb"), ("scene.hash", "0123456789abcdef"), ("rr_depth", "5")];
-        let image = Image { metadata: metadata.map(|(k, v)| (k.to_owned(), v.to_owned())).to_vec(), ..Default::default() };
+        let image =
+            Image { metadata: metadata.map(|(k, v)| (k.to_owned(), v.to_owned())).to_vec(), ..Default::default() };
         let of = |identity: &[(&'static str, Option<&str>)]| {
             let identity = identity.iter().map(|(k, v)| (*k, v.map(str::to_owned))).collect();
             difference(&image, &identity, "b.glb").map(|(key, its, ours)| format!("{key}: {its}, {ours}"))

@@ -75,7 +75,12 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] for settings that do not fit each other or the scene; those of the device.
-    pub fn frames(&mut self, settings: &RenderSettings, displays: bool, control: &mut dyn Control) -> Result<Frames<'_>> {
+    pub fn frames(
+        &mut self,
+        settings: &RenderSettings,
+        displays: bool,
+        control: &mut dyn Control,
+    ) -> Result<Frames<'_>> {
         // Complete the settings by the scene, if they have an effect together.
         settings.check()?;
         let mut laps = Laps::after_open(self.open_seconds.wall);
@@ -99,7 +104,8 @@ impl Renderer {
         let motion = camera_motion(scene, path, timeline.orbit)?;
         let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
-        let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
+        let sequence =
+            FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
 
         // The tracer. A single frame is one whose histories are full, not what it converges to.
         let integrator = settings.integrator();
@@ -107,8 +113,9 @@ impl Renderer {
         let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };
         let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, blend)?;
         let is_cpu = self.device.info.is_cpu();
-        let settling =
-            || Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings));
+        let settling = || {
+            Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings))
+        };
         let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {
@@ -257,8 +264,10 @@ impl Frames<'_> {
         self.done += 1;
         if self.done == self.count() {
             let start = Instant::now();
-            self.report.mean = covered_mean(&self.realtime.result()?, self.realtime.channels(), &self.realtime.coverage()?);
-            self.report.brightness = brightness::warning(self.report.mean, self.capabilities, f64::from(self.options.exposure));
+            self.report.mean =
+                covered_mean(&self.realtime.result()?, self.realtime.channels(), &self.realtime.coverage()?);
+            self.report.brightness =
+                brightness::warning(self.report.mean, self.capabilities, f64::from(self.options.exposure));
             self.report.setup.warnings.extend(self.report.brightness.clone());
             self.device.check_validation()?;
             self.device.save_pipeline_cache();
@@ -294,8 +303,12 @@ impl Frames<'_> {
         }
         let number = self.report.frames.last().map_or(self.range.first, |f| f.number);
         let of_frame = [("camera", camera_text(&self.last_camera)), ("frame", number.to_string()), ("spp", spp)];
-        let entries =
-            self.metadata.iter().cloned().chain(of_frame).chain(camera_numbers::metadata(&self.last_camera, self.aspect()));
+        let entries = self
+            .metadata
+            .iter()
+            .cloned()
+            .chain(of_frame)
+            .chain(camera_numbers::metadata(&self.last_camera, self.aspect()));
         let mut metadata: Vec<_> = entries.map(|(k, v)| (k.to_owned(), v)).collect();
         metadata.sort();
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
@@ -358,8 +371,9 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let shows_buffers = shown != DisplayMode::Result || Aov::Bent.is_in(&settings.image.aov);
     if settings.frames.antialias.is_none() {
         // without it edges of bright surfaces flicker
-        out.antialias =
-            out.history > 1 && !shows_buffers && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
+        out.antialias = out.history > 1
+            && !shows_buffers
+            && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
     }
     if is_radiance {
         out.check_radiance()?;
@@ -479,7 +493,11 @@ pub(super) fn scene_size(scene: &Scene) -> f64 {
 ///
 /// # Errors
 /// [`Error::Scene`] for an orbit around a scene without geometry.
-pub(super) fn camera_motion(scene: &Scene, path: Option<CameraPath>, orbit_frames: Option<u32>) -> Result<CameraMotion> {
+pub(super) fn camera_motion(
+    scene: &Scene,
+    path: Option<CameraPath>,
+    orbit_frames: Option<u32>,
+) -> Result<CameraMotion> {
     Ok(match (path, orbit_frames) {
         (Some(path), _) => CameraMotion::Path(path),
         (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
@@ -488,7 +506,8 @@ pub(super) fn camera_motion(scene: &Scene, path: Option<CameraPath>, orbit_frame
 }
 
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
-    let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("--orbit: the scene has no geometry to orbit around".into()))?;
+    let (lo, hi) =
+        scene.bounds().ok_or_else(|| Error::Scene("--orbit: the scene has no geometry to orbit around".into()))?;
     Orbit::vertical((lo + hi) * 0.5, frames)
 }
 

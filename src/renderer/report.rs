@@ -159,7 +159,9 @@ impl Setup {
     /// The parts of the run that took half a millisecond or more.
     fn seconds_line(&self, seconds: &Seconds) -> String {
         let parts = seconds.parts.iter().filter(|p| p.1 >= 0.000_5).map(|&(name, s)| match name {
-            "open" => format!("open {s:.3} (load {:.3} while the device starts in {:.3})", self.open.load, self.open.device),
+            "open" => {
+                format!("open {s:.3} (load {:.3} while the device starts in {:.3})", self.open.load, self.open.device)
+            }
             _ => format!("{name} {s:.3}"),
         });
         format!("{:.3} seconds: {}", seconds.total, parts.collect::<Vec<_>>().join(", "))
@@ -175,7 +177,13 @@ pub struct FilmReport {
 
 impl FilmReport {
     /// The report of a film of at most `spp` samples per pixel, which had `before` when resumed.
-    pub(super) fn new(options: &FilmSettings, hints: &RenderHints, image: &Accumulated, before: Option<u32>, spp: u32) -> Self {
+    pub(super) fn new(
+        options: &FilmSettings,
+        hints: &RenderHints,
+        image: &Accumulated,
+        before: Option<u32>,
+        spp: u32,
+    ) -> Self {
         let (min, mean, max) = image.film.samples_range();
         let estimated = image.film.estimated_rmse();
         let mut lines = Vec::new();
@@ -296,7 +304,10 @@ impl StillReport {
     fn explanations(&self) -> Vec<String> {
         let mut lines = vec![format!("tracer {}: {}", self.setup.tracer, self.setup.tracer_reason)];
         if let (Some(ComputeOptions { kernel, triangle_test }), Some(camera)) = (self.compute, self.coherent_kernel) {
-            lines.push(format!("traversal {kernel}: {}; camera rays: {camera}; triangle test {triangle_test}", kernel.help()));
+            lines.push(format!(
+                "traversal {kernel}: {}; camera rays: {camera}; triangle test {triangle_test}",
+                kernel.help()
+            ));
         }
         lines.extend(self.setup.features.iter().cloned());
         lines.extend(self.details.explanations.iter().cloned());
@@ -445,7 +456,8 @@ impl FramesReport {
     /// Median and 95th percentile of the milliseconds per frame, without skipped ones if possible.
     pub fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
-        let of = |frames: &mut dyn Iterator<Item = &FrameReport>| -> Vec<f64> { frames.map(|f| 1e3 * f.seconds).collect() };
+        let of =
+            |frames: &mut dyn Iterator<Item = &FrameReport>| -> Vec<f64> { frames.map(|f| 1e3 * f.seconds).collect() };
         let worked = of(&mut self.frames[from..].iter().filter(|f| !f.is_skipped()));
         let first = of(&mut self.frames.iter().filter(|f| !f.is_skipped()));
         let all = of(&mut self.frames[from..].iter());
@@ -576,8 +588,9 @@ impl FramesReport {
             })
         };
         let passes = self.passes().into_iter();
-        let passes: Map<_, _> =
-            passes.map(|(label, median, p95)| (label.to_owned(), json!({ "median_ms": median, "p95_ms": p95 }))).collect();
+        let passes: Map<_, _> = passes
+            .map(|(label, median, p95)| (label.to_owned(), json!({ "median_ms": median, "p95_ms": p95 })))
+            .collect();
         let own = json!({
             "integrator": self.integrator,
             "preset": self.preset,

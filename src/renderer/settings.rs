@@ -268,7 +268,11 @@ pub fn options_text(settings: &RenderSettings) -> String {
 /// A number with all its digits, as a power of ten where it would have many zeros.
 fn number_text(x: f64) -> String {
     let plain = x.to_string();
-    if plain.len() > 12 { Some(format!("{x:e}")).filter(|text| text.len() < plain.len()).unwrap_or(plain) } else { plain }
+    if plain.len() > 12 {
+        Some(format!("{x:e}")).filter(|text| text.len() < plain.len()).unwrap_or(plain)
+    } else {
+        plain
+    }
 }
 
 /// Values of an option for each time that it is given; `None` for one without a value.
@@ -331,7 +335,8 @@ impl RenderSettings {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             return super::defaults::parse_settings(path, &files::read_text(path)?);
         }
-        serde_json::from_slice(&files::read(path)?).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
+        serde_json::from_slice(&files::read(path)?)
+            .map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
     /// Reads a line of a person: the name of an integrator or of a preset of frames in real time,
@@ -466,7 +471,8 @@ impl RenderSettings {
     pub fn check(&self) -> Result<()> {
         let frames = self.realtime_setting();
         integrators::check(&self.given(), self.integrator(), frames.as_ref())?;
-        if let Some(setting) = frames.filter(|_| !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames))
+        if let Some(setting) =
+            frames.filter(|_| !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames))
         {
             return Err(Error::Usage(format!(
                 "--integrator {} has no frames in real time: add --spp N for stills, one per frame, or leave {} out",
@@ -515,7 +521,8 @@ impl RenderSettings {
         }
         // groups of settings, by name
         let groups = serde_json::to_value(self).unwrap_or_default();
-        let mut groups: Vec<_> = groups.as_object().into_iter().flatten().filter_map(|(_, group)| group.as_object()).collect();
+        let mut groups: Vec<_> =
+            groups.as_object().into_iter().flatten().filter_map(|(_, group)| group.as_object()).collect();
         while !groups.is_empty() {
             for (name, value) in std::mem::take(&mut groups).into_iter().flatten() {
                 if let Some(group) = value.as_object() {
@@ -578,7 +585,10 @@ mod tests {
     fn options_are_as_people_write_them() {
         let text = |line: &str| options_text(&RenderSettings::from_words(line).unwrap());
         assert_eq!(text("ao --eye 1.0,-2.50,0 --target 0,0,1e-3"), "--integrator ao --eye 1,-2.5,0 --target 0,0,0.001");
-        assert_eq!(text("ao --ao-falloff 6.763e26 --ao-radius 5.0"), "--integrator ao --ao-falloff 6.763e26 --ao-radius 5");
+        assert_eq!(
+            text("ao --ao-falloff 6.763e26 --ao-radius 5.0"),
+            "--integrator ao --ao-falloff 6.763e26 --ao-radius 5"
+        );
         assert_eq!(
             text("path --light 'sun direction=0,-1,0 irradiance=2'"),
             "--integrator path --light 'sun direction=0,-1,0 irradiance=2'"

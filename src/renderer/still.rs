@@ -84,7 +84,13 @@ impl IntermediateImage<'_> {
     }
 }
 
-fn save(image: &Image, integrator: &dyn Integrator, options: &PictureOptions, files: &FileSettings, path: &Path) -> Result<()> {
+fn save(
+    image: &Image,
+    integrator: &dyn Integrator,
+    options: &PictureOptions,
+    files: &FileSettings,
+    path: &Path,
+) -> Result<()> {
     let format = ImageFormat::from_path(path)?;
     if format == ImageFormat::Exr {
         return output::exr::write_with(image, path, &files.into());
@@ -122,7 +128,10 @@ impl Renderer {
     ) -> Result<Still> {
         settings.check()?;
         if let Some(frames) = settings.frames.given().first() {
-            return Err(Error::Usage(format!("{} is for frames, and a still is rendered: leave it out", frames.option())));
+            return Err(Error::Usage(format!(
+                "{} is for frames, and a still is rendered: leave it out",
+                frames.option()
+            )));
         }
         let start = Instant::now();
         let mut laps = Laps::after_open(self.open_seconds.wall);
@@ -171,7 +180,8 @@ impl Renderer {
         });
 
         // the samples, and the image of them
-        let composer = Composer { render: &render, pixels: &pixels, origin: flat.origin, denoising: denoising.as_ref() };
+        let composer =
+            Composer { render: &render, pixels: &pixels, origin: flat.origin, denoising: denoising.as_ref() };
         let rendered = render.trace(tracer, &flat, &composer, control, save)?;
         laps.lap("trace");
         let image = composer.compose(&rendered.image, control)?;
@@ -231,7 +241,10 @@ impl<'a> StillRender<'a> {
             integrator,
             identity: identity(integrator, &job, fingerprint),
             job,
-            rendered_by: [("tracer", renderer.kind.name().into()), ("device", format!("{} ({})", info.name, info.driver))],
+            rendered_by: [
+                ("tracer", renderer.kind.name().into()),
+                ("device", format!("{} ({})", info.name, info.driver)),
+            ],
             chosen: completed.options(),
             samples_before: None,
             warnings: scene.report.all_warnings(),
@@ -243,7 +256,15 @@ impl<'a> StillRender<'a> {
         let (settings, job) = (&self.completed.settings, &mut self.job);
         let (name, channels) = (&self.renderer.name, self.integrator.channels());
         let resume = |path| {
-            film_file::resume(path, name, channels, job.samples.size, job.samples.spp, &self.identity, &self.rendered_by)
+            film_file::resume(
+                path,
+                name,
+                channels,
+                job.samples.size,
+                job.samples.spp,
+                &self.identity,
+                &self.rendered_by,
+            )
         };
         let resumed = settings.film.resume.as_deref().map(resume).transpose()?;
         self.samples_before = resumed.as_ref().map(|r| r.state.max_samples());
@@ -463,7 +484,8 @@ impl Composer<'_> {
     /// Text attributes. They are identical for two runs of the same command.
     fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
         let StillRender { renderer, completed, job, .. } = self.render;
-        let mut out = vec![("scene", files::portable_name(&renderer.name)), ("spp", spp_text(image.spp, image.max_spp))];
+        let mut out =
+            vec![("scene", files::portable_name(&renderer.name)), ("spp", spp_text(image.spp, image.max_spp))];
         out.extend(camera_numbers::metadata(job.camera, job.aspect()));
         out.extend(self.render.rendered_by.iter().cloned());
         out.extend(self.render.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
@@ -501,5 +523,9 @@ impl Control for IntervalControl<'_> {
 
 /// Adds the scene data that auxiliary outputs need to `needs`.
 pub(super) fn aov_needs(needs: Needs, wanted: &[Aov]) -> Needs {
-    Needs { normals: needs.normals || Aov::Ns.is_in(wanted), albedo: needs.albedo || Aov::Albedo.is_in(wanted), ..needs }
+    Needs {
+        normals: needs.normals || Aov::Ns.is_in(wanted),
+        albedo: needs.albedo || Aov::Albedo.is_in(wanted),
+        ..needs
+    }
 }

@@ -71,7 +71,17 @@ impl Renderer {
             }
         };
         let camera = completed.camera.clone();
-        Ok(StillSequence { renderer: self, completed, camera, motion, file_camera, animation, range, fps, held: timeline.time })
+        Ok(StillSequence {
+            renderer: self,
+            completed,
+            camera,
+            motion,
+            file_camera,
+            animation,
+            range,
+            fps,
+            held: timeline.time,
+        })
     }
 }
 
@@ -124,7 +134,8 @@ impl StillSequence<'_> {
     pub fn render(&mut self, number: u32, control: &mut dyn Control) -> Result<Still> {
         let started = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
         self.completed.camera = self.pose(number)?;
-        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), started, control, &mut |_| Ok(()))?;
+        let mut still =
+            self.renderer.still_of(&self.completed, StillExtras::default(), started, control, &mut |_| Ok(()))?;
         still.image.metadata.push(("frame".into(), number.to_string()));
         still.image.metadata.sort();
         Ok(still)

@@ -55,12 +55,20 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
     };
 
     // The sign and the standard error of the bias belong to its value.
-    let bias_text =
-        format!("{}{} ± {}", if c.bias > 0.0 { "+" } else { "" }, format_number(c.bias), format_number(c.bias_standard_error));
+    let bias_text = format!(
+        "{}{} ± {}",
+        if c.bias > 0.0 { "+" } else { "" },
+        format_number(c.bias),
+        format_number(c.bias_standard_error)
+    );
     vec![
         error("RMSE", "Root of the mean squared error over all channels; 0 for equal images", c.rmse),
         error("MAE", "Mean absolute error; 0 for equal images", c.mae),
-        error("Relative MSE", "Mean of the squared error over the squared reference plus 0.01; 0 for equal images", c.rel_mse),
+        error(
+            "Relative MSE",
+            "Mean of the squared error over the squared reference plus 0.01; 0 for equal images",
+            c.rel_mse,
+        ),
         error("PSNR, dB", "Peak signal-to-noise ratio for a peak of 1; infinite for equal images", c.psnr),
         metric("SSIM", "Structural similarity of what a display shows; 1 for equal images", c.ssim),
         metric("FLIP", "Mean perceived difference of what a display shows, 0 (looks the same) to 1", c.flip),
@@ -81,7 +89,11 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
         error("Median", "Half of the absolute differences are smaller", c.percentiles.p50),
         error("95th percentile", "95 % of the absolute differences are smaller", c.percentiles.p95),
         error("99th percentile", "99 % of the absolute differences are smaller", c.percentiles.p99),
-        count("NaN pixels", "Pixels where one image is not a number, or both are none", Some(c.bad.nan + c.bad.nan_in_both)),
+        count(
+            "NaN pixels",
+            "Pixels where one image is not a number, or both are none",
+            Some(c.bad.nan + c.bad.nan_in_both),
+        ),
         count("Infinite pixels", "Pixels where one image is infinite and the other is not", Some(c.bad.infinite)),
         count(
             "Outliers",
@@ -94,7 +106,9 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
             name: "Error of the reference",
             help: "Root mean square of the standard errors of its pixels, were their samples independent: its own noise is at most that, and mostly less, for samples are stratified",
             value: c.reference_standard_error,
-            text: c.reference_standard_error.map_or_else(|| "-".to_owned(), |e| format!("at most {}", format_number(e))),
+            text: c
+                .reference_standard_error
+                .map_or_else(|| "-".to_owned(), |e| format!("at most {}", format_number(e))),
         },
     ]
 }
@@ -154,9 +168,12 @@ fn interleaved(image: &Image, channels: &[String]) -> Vec<f32> {
 pub fn metrics_table(images: &[NamedImage]) -> Table {
     let judged: Vec<_> = images.iter().filter_map(|i| Some((i, metrics(i.comparison?)))).collect();
     let mut table = Table::new(&["Metric"]).titled("Metrics");
-    table.columns.extend(judged.iter().map(|(i, _)| Column { title: i.name.to_owned(), help: i.description.to_owned() }));
+    table
+        .columns
+        .extend(judged.iter().map(|(i, _)| Column { title: i.name.to_owned(), help: i.description.to_owned() }));
     for k in 0..judged.first().map_or(0, |(_, m)| m.len()) {
-        let name = Cell { text: judged[0].1[k].name.to_owned(), help: judged[0].1[k].help.to_owned(), ..Cell::default() };
+        let name =
+            Cell { text: judged[0].1[k].name.to_owned(), help: judged[0].1[k].help.to_owned(), ..Cell::default() };
         let cells = judged.iter().map(|(_, m)| Cell { text: m[k].text.clone(), value: m[k].value, ..Cell::default() });
         table.rows.push(Row::new(std::iter::once(name).chain(cells)));
     }
@@ -165,7 +182,8 @@ pub fn metrics_table(images: &[NamedImage]) -> Table {
 
 /// Share of values by their difference, of all images that were compared.
 pub fn histogram(images: &[NamedImage]) -> Chart {
-    let differences: Vec<(&str, Vec<f64>)> = images.iter().filter_map(|i| Some((i.name, differences(i.comparison?)))).collect();
+    let differences: Vec<(&str, Vec<f64>)> =
+        images.iter().filter_map(|i| Some((i.name, differences(i.comparison?)))).collect();
     let mut sizes: Vec<f64> = differences.iter().flat_map(|(_, d)| d.iter().map(|d| d.abs())).collect();
     sizes.sort_by(f64::total_cmp);
     // a few values far out must not squeeze all others into one bin
@@ -308,7 +326,8 @@ mod tests {
         let named = |name, image, comparison| NamedImage { name, description: "", image, comparison };
         let images = [named("a", &a, Some(&c)), named("b", &b, None)];
         let section = section("Images", &images, 1).unwrap();
-        let [Part::Images(shown), Part::Table(metrics), Part::Chart(chart), Part::Table(regions)] = &section.parts[..] else {
+        let [Part::Images(shown), Part::Table(metrics), Part::Chart(chart), Part::Table(regions)] = &section.parts[..]
+        else {
             panic!("{section:?}")
         };
         assert_eq!((shown.size, shown.reference, shown.images[0].values[9]), ([8, 4], 1, 0.7));

@@ -82,7 +82,11 @@ impl ImageComparison {
             return wrong(format!("{}x{} pixels of {channels} channels", self.size[0], self.size[1]));
         }
         if self.reference >= self.images.len() {
-            return wrong(format!("there are {}, and the reference is number {}", self.images.len(), self.reference + 1));
+            return wrong(format!(
+                "there are {}, and the reference is number {}",
+                self.images.len(),
+                self.reference + 1
+            ));
         }
         for image in &self.images {
             if image.values.len() != pixels * channels || image.flip.as_ref().is_some_and(|f| f.len() != pixels) {
@@ -108,7 +112,11 @@ impl ImageComparison {
             size: self.size,
             channels: self.channels.clone(),
             images: images
-                .map(|i| ImageContext { name: i.name.clone(), description: i.description.clone(), has_flip: i.flip.is_some() })
+                .map(|i| ImageContext {
+                    name: i.name.clone(),
+                    description: i.description.clone(),
+                    has_flip: i.flip.is_some(),
+                })
                 .collect(),
             reference: self.reference,
             has_mask: self.mask.is_some(),
@@ -120,7 +128,10 @@ impl ImageComparison {
     pub(super) fn data(&self) -> Result<PixelData> {
         let channels = self.channels.len();
         let images = self.images.par_iter().map(|i| {
-            Ok(ImageData { values: encode(&i.values, channels)?, flip: i.flip.as_ref().map(|f| encode(f, 1)).transpose()? })
+            Ok(ImageData {
+                values: encode(&i.values, channels)?,
+                flip: i.flip.as_ref().map(|f| encode(f, 1)).transpose()?,
+            })
         });
         let mask = self.mask.as_ref().map(|m| compress(&m.iter().map(|&counts| u8::from(counts)).collect::<Vec<_>>()));
         Ok(PixelData { images: images.collect::<Result<_>>()?, mask: mask.transpose()? })

@@ -52,7 +52,8 @@ pub fn place(labels: &[([f64; 2], [f64; 2])], frame: Rect, obstacles: &[Rect]) -
     let mut taken = obstacles.to_vec();
     let mut placed = Vec::with_capacity(labels.len());
     for &(point, size) in labels {
-        let candidates = DISTANCES.iter().flat_map(|&d| DIRECTIONS.iter().map(move |&dir| (d, beside(point, size, dir, d))));
+        let candidates =
+            DISTANCES.iter().flat_map(|&d| DIRECTIONS.iter().map(move |&dir| (d, beside(point, size, dir, d))));
         let cost = |rect: &Rect| -> f64 { taken.iter().map(|t| t.overlap(&rect.grown(1.5))).sum() };
         let mut best: Option<(f64, f64, Rect)> = None;
         for (distance, rect) in candidates.filter(|(_, rect)| frame.contains(rect)) {

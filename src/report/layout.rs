@@ -85,8 +85,10 @@ impl Span {
         let is_range = |[lo, hi]: &[f64; 2]| fits(lo) && fits(hi) && hi - lo >= 1.0 / MAX_MAGNITUDE;
         let range = axis.range.filter(is_range).unwrap_or_else(|| {
             let rounded = |v: f64| if v.abs() < 1.0 / MAX_MAGNITUDE { 0.0 } else { v };
-            let [lo, hi] =
-                values.filter(fits).map(rounded).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+            let [lo, hi] = values
+                .filter(fits)
+                .map(rounded)
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
             match scale {
                 _ if lo > hi => [1.0, 10.0],
                 Scale::Logarithmic => [lo / 1.3, hi * 1.3],
@@ -134,7 +136,8 @@ impl Span {
                         if !(lo * (1.0 - 1e-9)..=hi * (1.0 + 1e-9)).contains(&value) {
                             continue;
                         }
-                        let has_text = if tens { k == 1 && decade % 2 == 0 } else { k == 1 || few && (k == 2 || k == 5) };
+                        let has_text =
+                            if tens { k == 1 && decade % 2 == 0 } else { k == 1 || few && (k == 2 || k == 5) };
                         ticks.push(tick(value, if has_text { short(value) } else { String::new() }));
                     }
                 }
@@ -206,7 +209,8 @@ impl ChartLayout {
 fn series_layout(series: &Series, chart: &Chart, [x, y]: [&Span; 2], color: usize) -> SeriesLayout {
     let label = |p: &Point| {
         if p.label.is_empty() {
-            let numbers = [(&chart.x, p.x), (&chart.y, p.y)].map(|(axis, v)| format!("{} {}", axis.label, format_number(v)));
+            let numbers =
+                [(&chart.x, p.x), (&chart.y, p.y)].map(|(axis, v)| format!("{} {}", axis.label, format_number(v)));
             format!("{}: {}", series.name, numbers.join(", "))
         } else {
             p.label.clone()
@@ -238,7 +242,9 @@ fn series_layout(series: &Series, chart: &Chart, [x, y]: [&Span; 2], color: usiz
     let joined: Vec<[f64; 2]> = points.iter().filter(|p| !p.is_muted).map(|p| [p.x, p.y]).collect();
     let corners = match series.mark {
         Mark::Points => Vec::new(),
-        Mark::Steps => joined.windows(2).flat_map(|w| [w[0], [w[1][0], w[0][1]]]).chain(joined.last().copied()).collect(),
+        Mark::Steps => {
+            joined.windows(2).flat_map(|w| [w[0], [w[1][0], w[0][1]]]).chain(joined.last().copied()).collect()
+        }
         Mark::Line | Mark::LineAndPoints | Mark::Border | Mark::Dashed => joined,
     };
     let line = corners.iter().map(|[x, y]| format!("{x},{y}")).collect::<Vec<_>>().join(" ");
@@ -358,9 +364,11 @@ mod tests {
                     let axis = |range| Axis { scale, range, ..Axis::default() };
                     let points = vec![Point::from((extreme, beside)), Point::from((beside, extreme))];
                     let series = vec![Series { points, ..Series::default() }];
-                    let layout = layout(&Chart { x: axis(Some([extreme, beside])), y: axis(None), series, ..Chart::default() });
+                    let layout =
+                        layout(&Chart { x: axis(Some([extreme, beside])), y: axis(None), series, ..Chart::default() });
                     assert!(layout.x_ticks.len() < 2000 && layout.y_ticks.len() < 2000);
-                    let drawn = serde_json::to_string(&(&layout.x_ticks, &layout.y_ticks)).unwrap() + &layout.series[0].line;
+                    let drawn =
+                        serde_json::to_string(&(&layout.x_ticks, &layout.y_ticks)).unwrap() + &layout.series[0].line;
                     assert!(
                         !drawn.contains("null") && !drawn.contains("NaN") && !drawn.contains("inf"),
                         "{extreme} {beside}: {drawn}"

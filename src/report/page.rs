@@ -101,7 +101,12 @@ pub fn write(dir: &Path, page: &Page) -> Result<PathBuf> {
             };
             parts.push(part);
         }
-        sections.push(SectionContext { title: section.title.clone(), status: section.status, folded: section.folded, parts });
+        sections.push(SectionContext {
+            title: section.title.clone(),
+            status: section.status,
+            folded: section.folded,
+            parts,
+        });
     }
     remove_data_after(&data, images);
 
@@ -145,7 +150,9 @@ pub fn address(path: &Path) -> String {
     let mut address = String::from("file://");
     for byte in path.to_string_lossy().bytes() {
         match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'-' | b'_' | b'.' | b'~' => address.push(char::from(byte)),
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'-' | b'_' | b'.' | b'~' => {
+                address.push(char::from(byte))
+            }
             // writing to a string does not fail
             _ => drop(write!(address, "%{byte:02X}")),
         }
@@ -194,7 +201,8 @@ mod tests {
         let table = Table::new(&["a", "b"])
             .row(Row::new(["<i>x</i>".into(), 0.5.into()]).of_region([0, 0, 1, 1]))
             .row(Row::new([Cell::from("c").to_section(0), Cell::from(2.0).with_status(Status::Bad)]));
-        let series = Series { name: "</svg>".into(), points: vec![(1.0, 2.0).into(), (2.0, 3.0).into()], ..Series::default() };
+        let series =
+            Series { name: "</svg>".into(), points: vec![(1.0, 2.0).into(), (2.0, 3.0).into()], ..Series::default() };
         let chart = Chart { title: "chart".into(), series: vec![series], ..Chart::default() };
         let parts = vec![Part::Text("1 < 2".into()), Part::Table(table), Part::Chart(chart), images()];
         let page = Page {

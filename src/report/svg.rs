@@ -12,7 +12,8 @@ use super::page::{broken, templates, write_text};
 use crate::error::{Error, Result};
 
 /// Colours of series on white (Okabe and Ito, "Color Universal Design", 2008): those of pages.
-const ON_WHITE: [&str; COLORS] = ["#0072b2", "#d55e00", "#009e73", "#b4578d", "#b07c00", "#6e3ca0", "#78782a", "#1d2125"];
+const ON_WHITE: [&str; COLORS] =
+    ["#0072b2", "#d55e00", "#009e73", "#b4578d", "#b07c00", "#6e3ca0", "#78782a", "#1d2125"];
 /// Height of title and subtitle, pixels.
 const HEAD: f64 = 92.0;
 /// Height of a line of a legend, pixels.

@@ -63,15 +63,18 @@ impl Table {
     /// The table as lines of text: the first column to the left, the others to the right.
     pub fn lines(&self) -> Vec<String> {
         let titles: Vec<&str> = self.columns.iter().map(|c| c.title.as_str()).collect();
-        let rows: Vec<Vec<&str>> = self.rows.iter().map(|r| r.cells.iter().map(|c| c.text.as_str()).collect()).collect();
+        let rows: Vec<Vec<&str>> =
+            self.rows.iter().map(|r| r.cells.iter().map(|c| c.text.as_str()).collect()).collect();
         let all: Vec<&Vec<&str>> = std::iter::once(&titles).chain(&rows).collect();
-        let width = |c: usize| all.iter().filter_map(|row| row.get(c)).map(|text| text.chars().count()).max().unwrap_or(0);
+        let width =
+            |c: usize| all.iter().filter_map(|row| row.get(c)).map(|text| text.chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..titles.len()).map(width).collect();
         let cell = |(c, text): (usize, &&str)| {
             let w = widths.get(c).copied().unwrap_or(0);
             if c == 0 { format!("{text:w$}") } else { format!("{text:>w$}") }
         };
-        let line = |row: &&Vec<&str>| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned();
+        let line =
+            |row: &&Vec<&str>| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned();
         all.iter().map(line).collect()
     }
 

@@ -73,8 +73,9 @@ mod tests {
         // an aligned square of four by four pixels, in the first frame; later ones are shifted and
         // stay as even
         for corner in [[0, 0], [8, 4], [640, 352]] {
-            let square =
-                |frame| (0..16u32).map(move |k| Sequence::Blue.get_2d(1, [corner[0] + k % 4, corner[1] + k / 4], frame, 0, 1));
+            let square = |frame| {
+                (0..16u32).map(move |k| Sequence::Blue.get_2d(1, [corner[0] + k % 4, corner[1] + k / 4], frame, 0, 1))
+            };
             assert_eq!(counts(square(0), 4), ones);
             let first: Vec<_> = square(0).collect();
             for (a, b) in first.iter().zip(square(7)) {

@@ -10,7 +10,9 @@
 //! Everything is unsigned 32-bit arithmetic that wraps: GLSL `uint` gives the same bits
 //! (`bitfieldReverse` is [`u32::reverse_bits`]).
 
-pub use crate::interface::records::sampler::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, PATH_FIRST, PATH_STRIDE, RAY_SEED};
+pub use crate::interface::records::sampler::{
+    AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, PATH_FIRST, PATH_STRIDE, RAY_SEED,
+};
 
 /// A good 32-bit mixer: Wellons' `lowbias32` (<https://nullprogram.com/blog/2018/07/31/>). A
 /// bijection with `hash(0) == 0`.

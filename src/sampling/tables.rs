@@ -60,7 +60,8 @@ pub fn blue_noise(side: usize, seed: u32) -> Vec<f32> {
         }
     }
     let mut rank = vec![0usize; n];
-    let mut start = Field { energy: field.energy.clone(), set: field.set.clone(), kernel: field.kernel.clone(), ..field };
+    let mut start =
+        Field { energy: field.energy.clone(), set: field.set.clone(), kernel: field.kernel.clone(), ..field };
     for r in (0..field.ones).rev() {
         let cluster = start.extreme(true);
         start.toggle(cluster);

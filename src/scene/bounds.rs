@@ -44,7 +44,8 @@ pub(super) fn of_scene(scene: &Scene) -> Option<(DVec3, DVec3)> {
     let certain = |(known, is_turned): (Extremes, bool), i: &Instance| {
         let Some(shape) = shape_of(i) else { return (known, is_turned) };
         let placed = PlacedBox::new(shape, &i.object_to_world);
-        let boxed = std::array::from_fn(|k| if placed.is_turned[k % 3] { f64::NEG_INFINITY } else { placed.extremes[k] });
+        let boxed =
+            std::array::from_fn(|k| if placed.is_turned[k % 3] { f64::NEG_INFINITY } else { placed.extremes[k] });
         let known = union(known, boxed);
         if placed.is_turned.contains(&true) {
             (shape.touching().iter().map(|p| shape.extremes_of(p, &i.object_to_world)).fold(known, union), true)
@@ -192,7 +193,9 @@ impl<'a> Shape<'a> {
         let p = to_world.transform_point3(point.truncate().as_dvec3());
         let radius = match self.geometry {
             Geometry::Triangles(_) => DVec3::ZERO,
-            Geometry::Spheres(_) => DVec3::from_array([0, 1, 2].map(|k| to_world.matrix3.row(k).length() * f64::from(point.w))),
+            Geometry::Spheres(_) => {
+                DVec3::from_array([0, 1, 2].map(|k| to_world.matrix3.row(k).length() * f64::from(point.w)))
+            }
         };
         let (high, low) = (p + radius, radius - p);
         [high.x, high.y, high.z, low.x, low.y, low.z]
@@ -246,8 +249,9 @@ fn extremes_of_triangles(t: &TriangleMesh, to_world: &DAffine3) -> Option<Extrem
     let vertices = t.positions.par_iter().enumerate().with_min_len(BLOCK);
     let found = vertices.fold(nothing, look).reduce(nothing, further);
     let vertices = found.map(|(_, index)| index as u32);
-    let uses =
-        |used: u8, triangle: &[u32; 3]| (0..6).fold(used, |used, k| used | u8::from(triangle.contains(&vertices[k])) << k);
+    let uses = |used: u8, triangle: &[u32; 3]| {
+        (0..6).fold(used, |used, k| used | u8::from(triangle.contains(&vertices[k])) << k)
+    };
     let used = t.indices.par_iter().with_min_len(BLOCK).fold(|| 0, uses).reduce(|| 0, |a, b| a | b);
     (used == 0b11_1111).then(|| found.map(|(value, _)| value))
 }

@@ -40,7 +40,8 @@ impl FromStr for ClipPlanes {
         if text.trim() == "none" {
             return Ok(Self::NONE);
         }
-        let numbers = text.split_once(',').and_then(|(near, far)| Some((near.trim().parse().ok()?, far.trim().parse().ok()?)));
+        let numbers =
+            text.split_once(',').and_then(|(near, far)| Some((near.trim().parse().ok()?, far.trim().parse().ok()?)));
         let planes = numbers.map(|(near, far)| Self { near, far });
         let holds = |p: &Self| p.near >= 0.0 && p.near.is_finite() && p.far > p.near;
         planes.filter(holds).ok_or_else(|| {
@@ -105,7 +106,8 @@ impl Camera {
     /// is parallel to the view direction another one is chosen. `fov_y` in radians.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Self {
         let back = (eye - target).try_normalize().unwrap_or(DVec3::Z);
-        let right = up.cross(back).try_normalize().filter(|r| r.is_finite()).unwrap_or_else(|| back.any_orthonormal_vector());
+        let right =
+            up.cross(back).try_normalize().filter(|r| r.is_finite()).unwrap_or_else(|| back.any_orthonormal_vector());
         let basis = DMat3::from_cols(right, back.cross(right), back);
         Self {
             name: String::new(),
@@ -126,7 +128,8 @@ impl Camera {
         let basis = Self::look_at(centre + direction, centre, DVec3::Y, fov_y).camera_to_world.matrix3;
         // least distance at which every corner of the box lies within the four planes of the view
         let tan = (fov_y * 0.5).tan();
-        let corners = (0..8u32).map(|k| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { -half[a] } else { half[a] })));
+        let corners =
+            (0..8u32).map(|k| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { -half[a] } else { half[a] })));
         let distance = corners
             .map(|c| {
                 let c = basis.transpose() * c;
@@ -219,7 +222,9 @@ mod tests {
             let mut sides = [f64::NEG_INFINITY; 4];
             for (centre, radius) in &points {
                 let p = world_to_camera.transform_point3(*centre);
-                for (side, value, tan) in [(0, p.x, tan * aspect), (1, -p.x, tan * aspect), (2, p.y, tan), (3, -p.y, tan)] {
+                for (side, value, tan) in
+                    [(0, p.x, tan * aspect), (1, -p.x, tan * aspect), (2, p.y, tan), (3, -p.y, tan)]
+                {
                     // the sphere's distance from the plane through the eye at this side
                     let angle = value.atan2(-p.z) + (radius / (value.hypot(p.z))).asin();
                     sides[side] = sides[side].max(angle.tan() / tan);

@@ -152,7 +152,10 @@ fn check(key: &Key, frame_before: Option<f64>) -> Result<(), String> {
         return Err("contains a number that is not finite, or beyond 1e30".into());
     }
     if let Some(before) = frame_before.filter(|before| *before >= key.frame) {
-        return Err(format!("frame {} does not come after frame {before} of the key before; frames must increase", key.frame));
+        return Err(format!(
+            "frame {} does not come after frame {before} of the key before; frames must increase",
+            key.frame
+        ));
     }
     let degrees = key.fov_y.to_degrees();
     // the ends themselves are allowed whatever the conversion rounds them to

@@ -174,7 +174,8 @@ mod tests {
                 to_map: glam::DMat3::IDENTITY,
             })
         };
-        let all = [Environment::Black, Environment::Uniform(Vec3::ONE), Environment::Uniform(Vec3::X), map(1.0), map(2.0)];
+        let all =
+            [Environment::Black, Environment::Uniform(Vec3::ONE), Environment::Uniform(Vec3::X), map(1.0), map(2.0)];
         let prints: Vec<_> = all.iter().map(of_environment).collect();
         for (k, print) in prints.iter().enumerate() {
             assert_eq!(prints.iter().position(|p| p == print), Some(k));

@@ -59,7 +59,8 @@ pub fn help() -> String {
 pub fn parse(text: &str) -> Result<LightSpec, String> {
     let mut words = text.split_whitespace();
     let kind = words.next().ok_or_else(|| format!("empty: {}, then key=value", kinds()))?;
-    let given = words.map(|w| w.split_once('=').ok_or_else(|| format!("'{w}' is no key=value"))).collect::<Result<_, _>>()?;
+    let given =
+        words.map(|w| w.split_once('=').ok_or_else(|| format!("'{w}' is no key=value"))).collect::<Result<_, _>>()?;
     let mut keys = Keys::new(kind, given);
 
     // the shape
@@ -216,7 +217,9 @@ mod tests {
         let mut scene = Scene::default();
         parse("portal position=1,2,3 direction=0,-1,0 size=2,3").unwrap().add(&mut scene);
         let portal = &scene.portals[0];
-        assert!((portal.corner + 0.5 * (portal.edges[0] + portal.edges[1]) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+        assert!(
+            (portal.corner + 0.5 * (portal.edges[0] + portal.edges[1]) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12
+        );
         assert!((portal.area() - 6.0).abs() < 1e-12 && scene.instances.is_empty() && scene.lights.is_empty());
     }
 

@@ -69,7 +69,14 @@ pub struct Clearcoat {
 
 impl Default for Clearcoat {
     fn default() -> Self {
-        Self { factor: 0.0, texture: None, roughness: 0.0, roughness_texture: None, normal_texture: None, normal_scale: 1.0 }
+        Self {
+            factor: 0.0,
+            texture: None,
+            roughness: 0.0,
+            roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+        }
     }
 }
 

@@ -29,9 +29,13 @@ impl Motion {
             match scene.meshes.get(m).map(|mesh| &mesh.geometry) {
                 Some(Geometry::Triangles(_)) => (),
                 Some(Geometry::Spheres(_)) => {
-                    return Err(Error::Usage(format!("mesh {m} cannot deform: it holds spheres; move its instances instead")));
+                    return Err(Error::Usage(format!(
+                        "mesh {m} cannot deform: it holds spheres; move its instances instead"
+                    )));
                 }
-                None => return Err(Error::Usage(format!("mesh {m} cannot deform: the scene has {}", scene.meshes.len()))),
+                None => {
+                    return Err(Error::Usage(format!("mesh {m} cannot deform: the scene has {}", scene.meshes.len())));
+                }
             }
         }
         Ok(())

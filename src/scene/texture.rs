@@ -65,7 +65,8 @@ impl TexelData {
     /// # Panics
     /// When there is no such texel.
     pub fn decode_srgb(&self, i: usize) -> [f32; 4] {
-        static EIGHT_BITS: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|v| srgb_decode(v as f32 / 255.0)));
+        static EIGHT_BITS: LazyLock<[f32; 256]> =
+            LazyLock::new(|| std::array::from_fn(|v| srgb_decode(v as f32 / 255.0)));
         let [r, g, b, a] = self.get(i);
         match self {
             Self::Unorm8(v) => {

@@ -165,7 +165,12 @@ fn list(names: &[&str]) -> String {
 ///
 /// # Errors
 /// [`Error::Usage`] for the first setting without effect.
-pub fn check(given: &[GivenSetting], integrator: &Integrator, all: &[Integrator], frames: Option<&GivenSetting>) -> Result<()> {
+pub fn check(
+    given: &[GivenSetting],
+    integrator: &Integrator,
+    all: &[Integrator],
+    frames: Option<&GivenSetting>,
+) -> Result<()> {
     let wrong = |text: String| Err(Error::Usage(text));
     for setting in given {
         let (option, applies) = (setting.option(), setting.applies);
@@ -292,8 +297,10 @@ mod tests {
         assert_eq!(some.editable().iter().map(|s| s.name).collect::<Vec<_>>(), ["max_depth", "fps"]);
         let [depth] = some.given()[..] else { panic!("one was given") };
         assert_eq!(depth.option(), "--max-depth");
-        let all: [Integrator; 3] = [("ao", &[]), ("path", &[Capability::PathLength]), ("direct", &[Capability::PathLength])];
-        let check = |given: &[GivenSetting], k: usize, frames: Option<&GivenSetting>| check(given, &all[k], &all, frames);
+        let all: [Integrator; 3] =
+            [("ao", &[]), ("path", &[Capability::PathLength]), ("direct", &[Capability::PathLength])];
+        let check =
+            |given: &[GivenSetting], k: usize, frames: Option<&GivenSetting>| check(given, &all[k], &all, frames);
         assert!(check(&[depth], 1, None).is_ok());
         let text = |r: Result<()>| r.unwrap_err().to_string();
         assert!(text(check(&[depth], 0, None)).contains("use --integrator path or direct"));

@@ -32,7 +32,8 @@ pub fn parse_number(text: &str) -> Parsed<f64> {
 
 /// `X,Y,Z`, finite.
 pub fn parse_vector(text: &str) -> Parsed<DVec3> {
-    let parts = text.split(',').map(parse_number).collect::<Parsed<Vec<_>>>().map_err(|_| "expected X,Y,Z".to_owned())?;
+    let parts =
+        text.split(',').map(parse_number).collect::<Parsed<Vec<_>>>().map_err(|_| "expected X,Y,Z".to_owned())?;
     match parts[..] {
         [x, y, z] if parts.iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
         _ => Err("expected three finite numbers X,Y,Z".into()),
@@ -123,8 +124,15 @@ mod tests {
         for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
             assert!(parse_vector(bad).is_err(), "{bad}");
         }
-        assert!(parse_radiance("0,0.5,2").is_ok() && parse_radiance("1,-1,1").is_err() && parse_radiance("1,1").is_err());
-        assert!(parse_fov("nan").is_err() && parse_fov("0").is_err() && parse_fov("180").is_err() && parse_fov("45").is_ok());
+        assert!(
+            parse_radiance("0,0.5,2").is_ok() && parse_radiance("1,-1,1").is_err() && parse_radiance("1,1").is_err()
+        );
+        assert!(
+            parse_fov("nan").is_err()
+                && parse_fov("0").is_err()
+                && parse_fov("180").is_err()
+                && parse_fov("45").is_ok()
+        );
         assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
         assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());
         assert!(parse_seconds("-1").is_err() && parse_seconds("1e300").is_err() && parse_seconds("0.5").is_ok());

@@ -175,8 +175,10 @@ impl Cache {
     /// Removes the oldest entries beyond the maximum.
     fn prune(&self) {
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return };
-        let mut all: Vec<_> =
-            entries.filter_map(|e| e.ok()).filter_map(|e| Some((e.metadata().ok()?.modified().ok()?, e.path()))).collect();
+        let mut all: Vec<_> = entries
+            .filter_map(|e| e.ok())
+            .filter_map(|e| Some((e.metadata().ok()?.modified().ok()?, e.path())))
+            .collect();
         all.sort();
         for (_, path) in all.iter().take(all.len().saturating_sub(MAX_ENTRIES)) {
             let _ = std::fs::remove_file(path);

@@ -20,7 +20,9 @@ mod unrolled;
 use std::borrow::Cow;
 
 pub use registry::*;
-pub use source::{ComputeShader, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Shader, Source, Stage, StreamShaders, Variant};
+pub use source::{
+    ComputeShader, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Shader, Source, Stage, StreamShaders, Variant,
+};
 pub(crate) use specialize::specialize;
 
 use crate::error::Result;
@@ -103,8 +105,12 @@ mod tests {
             let source = Source::Stream { pass: "path_camera", mode: Mode::Closest, variant };
             assert_eq!(PATH_CAMERA_CLOSEST.variant(variant), Some(Shader::new(source)));
         }
-        assert!(OCCLUSION_ANY.variant(Variant::Packet).is_none() && OCCLUSION_ANY.variant(Variant::Generate64).is_none());
-        assert!(PRIMARY_CLOSEST.variant(Variant::Known).is_none() && PRIMARY_CLOSEST.variant(Variant::Visibility).is_some());
+        assert!(
+            OCCLUSION_ANY.variant(Variant::Packet).is_none() && OCCLUSION_ANY.variant(Variant::Generate64).is_none()
+        );
+        assert!(
+            PRIMARY_CLOSEST.variant(Variant::Known).is_none() && PRIMARY_CLOSEST.variant(Variant::Visibility).is_some()
+        );
         assert!(RAYS_ANY.variant(Variant::Visibility).is_none() && RAYS_ANY.variant(Variant::Packet).is_some());
         assert_eq!(OCCLUSION_ANY.name(), "occlusion any");
         assert_eq!(RAYS_ANY.steps(), ["rays generate", "rays trace", "rays deliver"]);

@@ -255,7 +255,13 @@ impl Source {
         !matches!(
             self,
             Self::Compute {
-                pass: "filter" | "denoise" | "nlmeans" | "nlmeans_radiance" | "antialias" | "temporal" | "radiance_temporal",
+                pass: "filter"
+                    | "denoise"
+                    | "nlmeans"
+                    | "nlmeans_radiance"
+                    | "antialias"
+                    | "temporal"
+                    | "radiance_temporal",
                 ..
             }
         )
@@ -296,7 +302,9 @@ impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let bits = |int64: &bool| if *int64 { "64" } else { "32" };
         match self {
-            Self::Stream { pass, mode, variant } => write!(f, "{pass}.glsl as {} ({})", variant.template(), mode.name()),
+            Self::Stream { pass, mode, variant } => {
+                write!(f, "{pass}.glsl as {} ({})", variant.template(), mode.name())
+            }
             Self::Compute { pass, int64 } => write!(f, "{pass}.glsl ({}-bit loads)", bits(int64)),
             Self::Kernel { mode, ballot } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(ballot)),
             Self::File { path, .. } => f.write_str(path),

@@ -81,7 +81,8 @@ fn precise_names(definitions: &Definitions) -> BTreeSet<&str> {
         let more = |(name, body): &(&String, &String)| {
             !["main", "to_int", "divide", "any"].contains(&name.as_str()) && called(body).any(|w| precise.contains(w))
         };
-        let now: BTreeSet<_> = definitions.iter().filter(more).map(|(name, _)| name.as_str()).chain(["precise"]).collect();
+        let now: BTreeSet<_> =
+            definitions.iter().filter(more).map(|(name, _)| name.as_str()).chain(["precise"]).collect();
         if now.len() == precise.len() {
             return precise;
         }
@@ -132,7 +133,12 @@ fn precise_arithmetic_is_in_no_loop_that_is_unrolled() {
         assert!(precise.contains(name), "{name} is precise");
     }
     for (path, text) in &texts {
-        assert_eq!(found(text, &definitions), [""; 0], "{}: precise arithmetic in a loop that is unrolled", path.display());
+        assert_eq!(
+            found(text, &definitions),
+            [""; 0],
+            "{}: precise arithmetic in a loop that is unrolled",
+            path.display()
+        );
     }
     // one that breaks the rule
     let bad = "#define FOR_RAYS [[unroll]] for (int j = 0; j < 2; j++)\nvoid main() { FOR_RAYS { float e = edge(a[j], b[j]); } FOR_RAYS x[j] = 1.0; }";

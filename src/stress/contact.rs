@@ -78,8 +78,9 @@ pub fn wrong_sides(tracer: &Tracer, count: u32, control: &mut dyn Control) -> Re
         })
         .collect();
     let hits = trace(tracer, &rays, Mode::Closest, 1, control)?.0;
-    let is_right =
-        |i: usize, primitive: u32| if i.is_multiple_of(2) { matches!(primitive, 2 | 3) } else { matches!(primitive, 0 | 1) };
+    let is_right = |i: usize, primitive: u32| {
+        if i.is_multiple_of(2) { matches!(primitive, 2 | 3) } else { matches!(primitive, 0 | 1) }
+    };
     Ok(hits.iter().enumerate().filter(|(i, h)| !is_right(*i, h.primitive)).count())
 }
 
@@ -122,8 +123,10 @@ pub fn slack(
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let height = |r: &Ray| (wide(r.origin) - point).dot(normal);
     let with = |factor: f64| -> Vec<Ray> {
-        let moved =
-            |r: &Ray| Ray { origin: (wide(r.origin) + normal * (height(r) * (factor - 1.0))).as_vec3().to_array(), ..*r };
+        let moved = |r: &Ray| Ray {
+            origin: (wide(r.origin) + normal * (height(r) * (factor - 1.0))).as_vec3().to_array(),
+            ..*r
+        };
         rays.iter().map(moved).collect()
     };
     let mut hits = |rays: &[Ray], tracer: &Tracer| -> Result<usize> {
@@ -233,7 +236,8 @@ fn run(session: &mut Session) -> Result<()> {
 
     let name = "close to a corner, a box does not occlude itself";
     let mut corner = analytic::closed_box(2.0, SceneTransform::default());
-    corner.cameras[0] = Camera::look_at(DVec3::splat(1.0) + DVec3::new(1.3, 1.1, 0.9) * 1e-3, DVec3::splat(1.0), DVec3::Y, 0.9);
+    corner.cameras[0] =
+        Camera::look_at(DVec3::splat(1.0) + DVec3::new(1.3, 1.1, 0.9) * 1e-3, DVec3::splat(1.0), DVec3::Y, 0.9);
     session.measure_each(name, &kinds, |s, kind, w| super::scale::check_exact(s, kind, name, &corner, 1.0, w))?;
 
     // Two surfaces close to one another are told apart.
@@ -264,8 +268,9 @@ fn run(session: &mut Session) -> Result<()> {
                 let sentence = format!("of the spawned rays; {could}, {:.0} roundings at most", slack.roundings);
                 Ok(vec![
                     Check::at_most(offset.as_str(), slack.self_hits as f64, "self-hits", 0.0).says(sentence),
-                    Check::at_most(gap.as_str(), slack.largest / scale, "of the scale", GAP * 10.0)
-                        .says(format!("the largest offset of a plane of 10 by 10; {missed} rays miss a sheet at twice that")),
+                    Check::at_most(gap.as_str(), slack.largest / scale, "of the scale", GAP * 10.0).says(format!(
+                        "the largest offset of a plane of 10 by 10; {missed} rays miss a sheet at twice that"
+                    )),
                 ])
             })?;
         }

@@ -47,12 +47,19 @@ fn go_on(options: &PathOptions, from: FilmState, spp: u32) -> PathOptions {
 pub const SIZE: [u32; 2] = [8, 8];
 
 /// Largest relative error of a film of [`super::long_runs::constant`] continued to `last` samples.
-pub fn film_drift(setup: &Setup, kind: TracerKind, film: Option<FilmState>, last: u32, watch: &mut Watch) -> Result<f64> {
+pub fn film_drift(
+    setup: &Setup,
+    kind: TracerKind,
+    film: Option<FilmState>,
+    last: u32,
+    watch: &mut Watch,
+) -> Result<f64> {
     let scene = constant();
     let flat = FlatScene::new(&scene);
     let options = PathOptions { samples: SampleSettings::new(SIZE, 16, 0), max_depth: 0, ..Default::default() };
     let state = film.ok_or_else(|| Error::CheckFailed("no such film".into()))?;
-    let image = render(&super::scale::path_tracer(setup, kind, &flat)?, &flat, &go_on(&options, state, last), watch)?.image;
+    let image =
+        render(&super::scale::path_tracer(setup, kind, &flat)?, &flat, &go_on(&options, state, last), watch)?.image;
     let counted = image.film.samples.iter().all(|&n| n == last);
     let off = |(k, mean): (usize, &f32)| (f64::from(*mean) / f64::from(RADIANCE[k % 3]) - 1.0).abs();
     let worst = image.film.mean.iter().enumerate().map(off).fold(0.0, f64::max);
@@ -83,7 +90,8 @@ impl Sampled {
 
     /// Distance of the means in standard errors; NaN where samples do not differ as in the other.
     pub fn distance(&self, other: &Self) -> f64 {
-        let is_alike = self.varied as f64 > 0.9 * other.varied as f64 && (0.7..1.4).contains(&(self.error / other.error));
+        let is_alike =
+            self.varied as f64 > 0.9 * other.varied as f64 && (0.7..1.4).contains(&(self.error / other.error));
         if is_alike { (self.mean - other.mean).abs() / self.error.hypot(other.error) } else { f64::NAN }
     }
 }
@@ -94,7 +102,8 @@ pub fn samples(setup: &Setup, kind: TracerKind, first: u32, count: u32, watch: &
     let flat = FlatScene::new(&scene);
     let options = PathOptions { samples: SampleSettings::new([16, 16], 16, 3), max_depth: 2, ..Default::default() };
     // so many samples of nothing: what is added to them is what is seen
-    let none = film_after(options.samples.size, first, [0.0; 3]).ok_or_else(|| Error::CheckFailed("no such film".into()))?;
+    let none =
+        film_after(options.samples.size, first, [0.0; 3]).ok_or_else(|| Error::CheckFailed("no such film".into()))?;
     let tracer = super::scale::path_tracer(setup, kind, &flat)?;
     let image = render(&tracer, &flat, &go_on(&options, none, first + count), watch)?.image;
     let state = image.state.ok_or_else(|| Error::CheckFailed("the film's sums were not kept".into()))?;
@@ -107,7 +116,13 @@ pub fn samples(setup: &Setup, kind: TracerKind, first: u32, count: u32, watch: &
 }
 
 /// Frames of a scene from number `first` on, the camera a step aside in each: pixels of geometry.
-pub fn frames_from(tracer: &Tracer, scene: &Scene, settings: &Settings, first: u32, count: u32) -> Result<Vec<Vec<f32>>> {
+pub fn frames_from(
+    tracer: &Tracer,
+    scene: &Scene,
+    settings: &Settings,
+    first: u32,
+    count: u32,
+) -> Result<Vec<Vec<f32>>> {
     let size = [32, 18];
     let mut realtime = Realtime::new(tracer, size, settings, &[])?;
     realtime.start_at(first);
@@ -138,7 +153,8 @@ pub fn frame_distance(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
         if frames.windows(2).any(|w| w[0] == w[1]) {
             return [f64::NAN; 2];
         }
-        let means: Vec<f64> = frames.iter().map(|f| f.iter().map(|v| f64::from(*v)).sum::<f64>() / f.len() as f64).collect();
+        let means: Vec<f64> =
+            frames.iter().map(|f| f.iter().map(|v| f64::from(*v)).sum::<f64>() / f.len() as f64).collect();
         let n = means.len() as f64;
         let mean = means.iter().sum::<f64>() / n;
         [mean, (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt()]
@@ -162,7 +178,8 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
         let name = format!("samples past {what}");
         session.measure_each(&name, &shading, |s, kind, w| {
             let off = samples(s, kind, first, steps, w)?.distance(&samples(s, kind, 0, steps, w)?);
-            Ok(Check::at_most(name.as_str(), off, "standard errors", 4.5).says("between their mean and that of the first ones"))
+            Ok(Check::at_most(name.as_str(), off, "standard errors", 4.5)
+                .says("between their mean and that of the first ones"))
         })?;
     }
     // numbers of frames go on at 0 after the last

@@ -70,7 +70,12 @@ pub fn random_point(i: u32, k: u32) -> DVec3 {
 }
 
 pub fn ray(origin: DVec3, direction: DVec3) -> Ray {
-    Ray { origin: origin.as_vec3().to_array(), tmin: 0.0, direction: direction.as_vec3().to_array(), tmax: f32::INFINITY }
+    Ray {
+        origin: origin.as_vec3().to_array(),
+        tmin: 0.0,
+        direction: direction.as_vec3().to_array(),
+        tmax: f32::INFINITY,
+    }
 }
 
 /// Rays at corners of the triangles, at points of their edges, and along their edges.
@@ -179,11 +184,13 @@ pub fn nested(gentle: bool, steep: bool, rays: usize) -> (Scene, Vec<Ray>) {
 
 /// Many nested spheres, and many of the same place and size.
 pub fn nested_spheres(rays: usize) -> (Scene, Vec<Ray>) {
-    let balls = (0..500)
-        .map(|k| Sphere { center: Vec3::new(0.1, 0.2, 0.3), radius: if k < 300 { 0.97f32.powi(k) } else { 0.5 } })
-        .chain(
-            (0..100).map(|i| Sphere { center: random_point(i, 0).as_vec3() * 2.0, radius: 1e-5 + 1e-3 * random(i, 3) as f32 }),
-        );
+    let balls =
+        (0..500)
+            .map(|k| Sphere { center: Vec3::new(0.1, 0.2, 0.3), radius: if k < 300 { 0.97f32.powi(k) } else { 0.5 } })
+            .chain((0..100).map(|i| Sphere {
+                center: random_point(i, 0).as_vec3() * 2.0,
+                radius: 1e-5 + 1e-3 * random(i, 3) as f32,
+            }));
     let scene = instance_at_origin(Geometry::Spheres(balls.collect()));
     let oracle = oracle_of(&scene);
     let mut set = random_rays(&oracle, rays, 6);
@@ -355,7 +362,13 @@ fn run(session: &mut Session) -> Result<()> {
 }
 
 /// Most samples of a body's image that may see the body itself, if it is convex: none.
-pub fn self_occluded(tracer: &Tracer, scene: &Scene, size: u32, spp: u32, control: &mut dyn Control) -> Result<(f64, f64)> {
+pub fn self_occluded(
+    tracer: &Tracer,
+    scene: &Scene,
+    size: u32,
+    spp: u32,
+    control: &mut dyn Control,
+) -> Result<(f64, f64)> {
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("no geometry".into()))?;
     let middle = (lo + hi) * 0.5;
     let camera = Camera::look_at(middle + DVec3::new(0.5, 0.3, 2.0), middle, DVec3::Y, 1.5);
@@ -384,7 +397,8 @@ fn needles(session: &mut Session) -> Result<()> {
     for (what, scene) in needle_bodies() {
         let name = format!("needles do not meet themselves: {what}");
         session.measure_each(&name, &kinds, |s, kind, w| {
-            let (covered, off) = self_occluded(&s.tracer(kind, &scene)?, &scene, effort.pick(64, 256), effort.pick(8, 64), w)?;
+            let (covered, off) =
+                self_occluded(&s.tracer(kind, &scene)?, &scene, effort.pick(64, 256), effort.pick(8, 64), w)?;
             Ok(Check::at_most(name.as_str(), off, "samples", 0.0).says(format!("of {covered}")))
         })?;
     }

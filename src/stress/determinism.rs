@@ -30,7 +30,11 @@ const STEP: f32 = 1e-5;
 
 /// Values of two images that differ in any bit; all, if their numbers do.
 pub fn different_bits(a: &[f32], b: &[f32]) -> usize {
-    if a.len() == b.len() { a.iter().zip(b).filter(|(a, b)| a.to_bits() != b.to_bits()).count() } else { a.len().max(b.len()) }
+    if a.len() == b.len() {
+        a.iter().zip(b).filter(|(a, b)| a.to_bits() != b.to_bits()).count()
+    } else {
+        a.len().max(b.len())
+    }
 }
 
 /// Share of two images' values that differ by more than `STEP`, and the difference of their means.
@@ -50,7 +54,10 @@ fn run(session: &mut Session) -> Result<()> {
     let stairs = scene("stairs")?;
     let ao = |s: &Setup, kind, w: &mut Watch| -> Result<Vec<f32>> {
         let tracer = s.tracer(kind, &stairs)?;
-        Ok(closed_forms::render(&tracer, &stairs, &stairs.cameras[0], &options(size, spp, 1.0, 2.0), w)?.image.film.mean)
+        Ok(closed_forms::render(&tracer, &stairs, &stairs.cameras[0], &options(size, spp, 1.0, 2.0), w)?
+            .image
+            .film
+            .mean)
     };
     let name = "ambient occlusion, two runs";
     session.measure_each(name, &kinds, |s, kind, w| {
@@ -86,7 +93,13 @@ fn run(session: &mut Session) -> Result<()> {
 }
 
 /// The same image without the tiles to which nothing projects, in launches of other sizes.
-fn masked_tiles(setup: &Setup, kind: crate::tracer::TracerKind, name: &str, scene: &Scene, watch: &mut Watch) -> Result<Check> {
+fn masked_tiles(
+    setup: &Setup,
+    kind: crate::tracer::TracerKind,
+    name: &str,
+    scene: &Scene,
+    watch: &mut Watch,
+) -> Result<Check> {
     use crate::film::camera::CameraRecord;
     use crate::film::tile_mask::TileMask;
     use crate::integrators::ao;
@@ -99,7 +112,8 @@ fn masked_tiles(setup: &Setup, kind: crate::tracer::TracerKind, name: &str, scen
     let masked = tile_mask.is_some();
     let some = ao::render(&tracer, &record, &whole.with_samples(|s| s.tile_mask = tile_mask), watch)?.image.film.mean;
     let note = if masked { "some tiles were left out" } else { "no tile could be left out" };
-    Ok(Check::at_most(name, different_bits(&all, &some) as f64, "pixels", 0.0).says(format!("of {} differ; {note}", all.len())))
+    Ok(Check::at_most(name, different_bits(&all, &some) as f64, "pixels", 0.0)
+        .says(format!("of {} differ; {note}", all.len())))
 }
 
 /// Renders an image in a process of its own, with these variables of its environment.
@@ -180,11 +194,13 @@ fn restarts(session: &mut Session) -> Result<()> {
         session.measure(&name, None, |s, _| {
             // Mesa's cache does not distinguish widths
             let cache = cache.to_string_lossy().into_owned();
-            let image = in_child(&program, s, &file, &[("LP_NATIVE_VECTOR_WIDTH", bits), ("MESA_SHADER_CACHE_DIR", &cache)])?;
+            let image =
+                in_child(&program, s, &file, &[("LP_NATIVE_VECTOR_WIDTH", bits), ("MESA_SHADER_CACHE_DIR", &cache)])?;
             let (share, bias) = difference(visibility(&image)?, unchanged(s)?);
             let value = if bias.abs() > 1e-3 { f64::NAN } else { share };
-            let sentence =
-                format!("of the pixels differ by more than {STEP:e} from the width in use; means differ by {bias:+.1e}");
+            let sentence = format!(
+                "of the pixels differ by more than {STEP:e} from the width in use; means differ by {bias:+.1e}"
+            );
             Ok(Check::at_most(name.as_str(), value, "of the pixels", SHARE).says(sentence))
         })?;
     }

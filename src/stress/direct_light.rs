@@ -26,7 +26,14 @@ pub fn lit_floors(scale: f64) -> Vec<(&'static str, Scene, f64)> {
         let mut scene = unlit_floor(scale);
         let direction = -at.normalize();
         let intensity = Vec3::splat(intensity as f32);
-        scene.lights.push(Light { name: String::new(), kind, intensity, position: at, direction, range: f64::INFINITY });
+        scene.lights.push(Light {
+            name: String::new(),
+            kind,
+            intensity,
+            position: at,
+            direction,
+            range: f64::INFINITY,
+        });
         scene
     };
     let reflected = ALBEDO / std::f64::consts::PI * 3.0 * 0.8;
@@ -97,13 +104,16 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
     let mut meshes: Vec<Value> = Vec::new();
     for mesh in &scene.meshes {
         let Geometry::Triangles(t) = &mesh.geometry else { continue };
-        let positions: Vec<Vec3> = t.positions.iter().map(|p| inverse.transform_point3(p.as_dvec3()).as_vec3()).collect();
-        let (lo, hi) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
+        let positions: Vec<Vec3> =
+            t.positions.iter().map(|p| inverse.transform_point3(p.as_dvec3()).as_vec3()).collect();
+        let (lo, hi) =
+            positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
         let corners = json!({ "componentType": 5126, "type": "VEC3", "count": positions.len(), "min": lo.to_array(), "max": hi.to_array() });
         let position = view(bytemuck::cast_slice(&positions), corners);
         let indices = json!({ "componentType": 5125, "type": "SCALAR", "count": 3 * t.indices.len() });
         // a transform that mirrors turns faces over
-        let turned: Vec<[u32; 3]> = t.indices.iter().map(|&[a, b, c]| if mirrors { [a, c, b] } else { [a, b, c] }).collect();
+        let turned: Vec<[u32; 3]> =
+            t.indices.iter().map(|&[a, b, c]| if mirrors { [a, c, b] } else { [a, b, c] }).collect();
         let indices = view(bytemuck::cast_slice(&turned), indices);
         leaves.push(json!({ "mesh": meshes.len() }));
         meshes.push(
@@ -165,7 +175,9 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
     }
     for (what, scene, expected) in lit_floors(1.0) {
         for (map_name, map) in placed_maps() {
-            measure(session, &format!("{what}, floor and emitter {map_name}"), expected, |_| Ok(through(&scene, &map)))?;
+            measure(session, &format!("{what}, floor and emitter {map_name}"), expected, |_| {
+                Ok(through(&scene, &map))
+            })?;
         }
         if scene.meshes.iter().all(|m| matches!(m.geometry, Geometry::Triangles(_))) {
             measure(session, &format!("{what}, in nested nodes of a glTF file"), expected, |_| nested(&scene))?;
@@ -176,15 +188,23 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
 
 /// The maps of [`linear_maps`], and the product of [`nested_nodes`].
 fn placed_maps() -> Vec<(&'static str, DMat3)> {
-    let nested = nested_nodes().iter().fold(DMat3::IDENTITY, |m, &(_, r, s)| m * DMat3::from_quat(r) * DMat3::from_diagonal(s));
+    let nested =
+        nested_nodes().iter().fold(DMat3::IDENTITY, |m, &(_, r, s)| m * DMat3::from_quat(r) * DMat3::from_diagonal(s));
     let mut maps = linear_maps();
     maps.push(("turned and stretched thrice", nested));
     maps
 }
 
-fn measure(session: &mut Session, name: &str, expected: f64, scene: impl Fn(&mut Watch) -> Result<Scene>) -> Result<()> {
+fn measure(
+    session: &mut Session,
+    name: &str,
+    expected: f64,
+    scene: impl Fn(&mut Watch) -> Result<Scene>,
+) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    let options = PathOptions { samples: SampleSettings::new([16, 16], effort.pick(16, 1024), 5), ..Default::default() };
-    session
-        .measure_each(name, &kinds, |s, kind, w| sampling::check_mean(s, kind, name, &scene(w)?, &options, expected, 2e-6, w))
+    let options =
+        PathOptions { samples: SampleSettings::new([16, 16], effort.pick(16, 1024), 5), ..Default::default() };
+    session.measure_each(name, &kinds, |s, kind, w| {
+        sampling::check_mean(s, kind, name, &scene(w)?, &options, expected, 2e-6, w)
+    })
 }

@@ -24,7 +24,8 @@ pub const SECTION: Section = Section {
     run,
 };
 
-pub const TONE_MAPS: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Exponential, ToneMap::Reinhard, ToneMap::Neutral, ToneMap::Agx];
+pub const TONE_MAPS: [ToneMap; 5] =
+    [ToneMap::Linear, ToneMap::Exponential, ToneMap::Reinhard, ToneMap::Neutral, ToneMap::Agx];
 
 /// Greys from 0 to beyond what any display shows.
 fn greys() -> impl Iterator<Item = f32> {
@@ -45,7 +46,8 @@ pub fn bad_colours(map: impl Fn([f32; 3]) -> [f32; 3]) -> usize {
         for g in hard {
             for b in [0.0, 1.0, 1e30, f32::NAN] {
                 // slightly below 0 is what gamuts do, and is cut off later
-                bad += usize::from(map([r, g, b]).iter().any(|x| !x.is_finite() || *x < -1e-3 && !(r < 0.0 || g < 0.0)));
+                bad +=
+                    usize::from(map([r, g, b]).iter().any(|x| !x.is_finite() || *x < -1e-3 && !(r < 0.0 || g < 0.0)));
             }
         }
     }
@@ -65,7 +67,8 @@ fn run(session: &mut Session) -> Result<()> {
         session.measure(&name, None, |_, _| {
             // polynomials leave their end by a rounding
             let count = falls(|x| map.map([x; 3])[1], 1e-6);
-            Ok(Check::at_most(name.as_str(), count as f64, "greys", 0.0).says("of 1602 are shown darker than a darker one"))
+            Ok(Check::at_most(name.as_str(), count as f64, "greys", 0.0)
+                .says("of 1602 are shown darker than a darker one"))
         })?;
         let name = format!("tone map {map} of NaN, infinity and 1e30");
         session.measure(&name, None, |_, _| {
@@ -75,7 +78,8 @@ fn run(session: &mut Session) -> Result<()> {
     }
     let name = "sRGB there and back";
     session.measure(name, None, |_, _| {
-        let worst = (0..=1000).map(|k| k as f32 / 1000.0).map(|x| (srgb_decode(srgb_encode(x)) - x).abs()).fold(0.0, f32::max);
+        let worst =
+            (0..=1000).map(|k| k as f32 / 1000.0).map(|x| (srgb_decode(srgb_encode(x)) - x).abs()).fold(0.0, f32::max);
         let bytes = [f32::NAN, f32::NEG_INFINITY, -1.0, 0.0, 1.0, 1e30, f32::INFINITY].map(srgb_byte);
         let right = bytes[1..4] == [0; 3] && bytes[4..] == [255; 3];
         let value = if right { f64::from(worst) } else { f64::NAN };
@@ -95,7 +99,8 @@ fn constants(session: &mut Session) -> Result<()> {
             let name = format!("{what} of {scene_name}, {frames} frames");
             session.measure_each(&name, &kinds, |s, kind, _| {
                 let tracer = Tracer::new(s.device(), kind, &FlatScene::new(scene), super::degenerate::NEEDS)?;
-                let (off, seen) = frames_off(&tracer, scene, &settings, frames, DVec3::new(0.007, 0.003, -0.004), value)?;
+                let (off, seen) =
+                    frames_off(&tracer, scene, &settings, frames, DVec3::new(0.007, 0.003, -0.004), value)?;
                 let figure = if seen == 0 { f64::NAN } else { off as f64 };
                 let is_ours = value == 1.0 || kind == TracerKind::Compute;
                 let check = if is_ours {

@@ -110,7 +110,14 @@ fn film_of(size: u32, spp: u32, hits: u32, hot: f32, noisy: bool) -> Film {
 }
 
 /// Applies a still's filter to a film with a hot pixel.
-pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, noisy: bool, watch: &mut Watch) -> Result<Spread> {
+pub fn still(
+    setup: &Setup,
+    kind: TracerKind,
+    filter: FilterKind,
+    hot: f32,
+    noisy: bool,
+    watch: &mut Watch,
+) -> Result<Spread> {
     let image = filtered(setup, kind, filter, &film(SIZE, hot, noisy), watch)?;
     let settings = denoise::Settings { kind: filter, ..Default::default() };
     // non-local means follow
@@ -268,7 +275,8 @@ pub fn rare_occlusion(setup: &Setup, kind: TracerKind, settings: &Settings, side
     let mut sum = 0.0;
     for frame in 0..frames {
         let mut camera = scene.cameras[0].clone();
-        camera.camera_to_world = DAffine3::from_translation(DVec3::X * 1e-3 * f64::from(frame)) * camera.camera_to_world;
+        camera.camera_to_world =
+            DAffine3::from_translation(DVec3::X * 1e-3 * f64::from(frame)) * camera.camera_to_world;
         realtime.frame(&tracer, &CameraRecord::new(&camera, scene.origin(), 16.0 / 9.0), &[])?;
         sum += realtime.result()?.iter().map(|v| 1.0 - f64::from(*v)).sum::<f64>();
     }
@@ -288,7 +296,9 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
         for hot in HOT {
             for (noisy, noise) in [(true, "noisy"), (false, "without noise")] {
                 let name = format!("{filter} filter of a still with one pixel of {hot:e}, {noise}");
-                session.measure_each(&name, &kinds, |s, kind, w| Ok(still(s, kind, filter, hot, noisy, w)?.check(&name)))?;
+                session.measure_each(&name, &kinds, |s, kind, w| {
+                    Ok(still(s, kind, filter, hot, noisy, w)?.check(&name))
+                })?;
             }
         }
         for (what, detail) in [("quiet pixels", 0.0), ("detail", GLINT_DETAIL)] {
@@ -298,13 +308,16 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
             })?;
         }
         let name = format!("{filter} filter of a still, rare light");
-        session.measure_each(&name, &kinds, |s, kind, w| Ok(check_rare_light(&name, rare_light(s, kind, filter, 1.0, w)?)))?;
+        session.measure_each(&name, &kinds, |s, kind, w| {
+            Ok(check_rare_light(&name, rare_light(s, kind, filter, 1.0, w)?))
+        })?;
     }
     let count = effort.pick(24, 240);
     for (what, settings) in super::display::filters() {
         for hot in HOT {
             let name = format!("{what} of {count} frames with one pixel of {hot:e}");
-            session.measure_each(&name, &kinds, |s, kind, _| Ok(frames(s, kind, &settings, hot, count)?.check(&name)))?;
+            session
+                .measure_each(&name, &kinds, |s, kind, _| Ok(frames(s, kind, &settings, hot, count)?.check(&name)))?;
         }
         let name = format!("{what} of a rare occluder, no history");
         session.measure_each(&name, &kinds, |s, kind, _| {

@@ -50,7 +50,8 @@ impl Kerb {
         let scene = scene_of([floor, wall].map(|g| (g, vec![glam::DAffine3::IDENTITY])).into());
         let point = turn * DVec3::new(along * half, 0.0, 1.0);
         // over the floor, looking down on a patch that is small beside the distance of the wall
-        let camera = Camera::look_at(point + turn * DVec3::new(0.0, 7.5, 0.0), point, turn * DVec3::NEG_Z, 6f64.to_radians());
+        let camera =
+            Camera::look_at(point + turn * DVec3::new(0.0, 7.5, 0.0), point, turn * DVec3::NEG_Z, 6f64.to_radians());
         Self { scene, camera, point, normal: turn * DVec3::Y, wall: [corners[0], corners[1]] }
     }
 
@@ -159,7 +160,8 @@ pub fn long_box(length: f64, split: bool, turn: DQuat) -> Scene {
     let cap = |x: f64| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[y, z]| DVec3::new(x, y, z));
     quads.extend([cap(-half), cap(half)]);
     let mut scene = scene_of(vec![(turned(shapes::quads(&quads), turn), vec![glam::DAffine3::IDENTITY])]);
-    let camera = Camera::look_at(turn * DVec3::new(0.2, 0.4, 0.3), turn * DVec3::new(0.9, -0.8, -0.5), turn * DVec3::Y, 1.2);
+    let camera =
+        Camera::look_at(turn * DVec3::new(0.2, 0.4, 0.3), turn * DVec3::new(0.9, -0.8, -0.5), turn * DVec3::Y, 1.2);
     scene.cameras.push(camera);
     scene
 }
@@ -193,7 +195,14 @@ fn check_kerb(setup: &Setup, kind: TracerKind, name: &str, kerb: &Kerb, watch: &
         .says(format!("closed form {:.5}, standard error {:.1e}", bias.expected, bias.standard_error)))
 }
 
-fn check_hits(setup: &Setup, kind: TracerKind, name: &str, kerb: &Kerb, length: f64, watch: &mut Watch) -> Result<Check> {
+fn check_hits(
+    setup: &Setup,
+    kind: TracerKind,
+    name: &str,
+    kerb: &Kerb,
+    length: f64,
+    watch: &mut Watch,
+) -> Result<Check> {
     let [t, point] = kerb.errors(&setup.tracer(kind, &kerb.scene)?, 4000, watch)?;
     let check = Check::at_most(name, t.max(point), "of the distance", hit_bound(length));
     let check = check.says(format!("off: the distance by {t:.1e}, the point between the corners by {point:.1e}"));
@@ -208,7 +217,9 @@ fn run(session: &mut Session) -> Result<()> {
             let kerb = Kerb::new(length, along, turn);
             let name = format!("a wall on a floor, length {length:e}, {orientation}");
             // beyond, rays start off the floor at a height that matters beside the wall's
-            session.measure_each(&name, &kinds, |s, kind, w| Ok(held(check_kerb(s, kind, &name, &kerb, w)?, length <= 1e6)))?;
+            session.measure_each(&name, &kinds, |s, kind, w| {
+                Ok(held(check_kerb(s, kind, &name, &kerb, w)?, length <= 1e6))
+            })?;
             let name = format!("hits of a wall, length {length:e}, {orientation}");
             session.measure_each(&name, &kinds, |s, kind, w| check_hits(s, kind, &name, &kerb, length, w))?;
             for (what, split) in [("box", false), ("box of uneven quads", true)] {

@@ -40,7 +40,10 @@ pub(super) const RADIANCE: [f32; 3] = [0.1, 0.7, 3.3];
 pub fn constant() -> Scene {
     let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 0.9);
     let behind = shapes::sphere(DVec3::Z * 5.0, 1.0);
-    Scene { environment: Environment::Uniform(Vec3::from_array(RADIANCE)), ..scene_of(vec![(behind, matte(0.5))], camera) }
+    Scene {
+        environment: Environment::Uniform(Vec3::from_array(RADIANCE)),
+        ..scene_of(vec![(behind, matte(0.5))], camera)
+    }
 }
 
 fn up_to(options: &PathOptions, spp: u32, start: Option<FilmState>) -> PathOptions {
@@ -134,9 +137,11 @@ fn run(session: &mut Session) -> Result<()> {
         let scene = constant();
         let flat = FlatScene::new(&scene);
         let options = PathOptions { samples: SampleSettings::new([8, 8], 16, 0), max_depth: 0, ..Default::default() };
-        let image = render(&super::scale::path_tracer(s, kind, &flat)?, &flat, &up_to(&options, samples, None), w)?.image;
+        let image =
+            render(&super::scale::path_tracer(s, kind, &flat)?, &flat, &up_to(&options, samples, None), w)?.image;
         let (worst, naive) = drift(&image);
-        Ok(Check::at_most(name.as_str(), worst, "relative", DRIFT).says(format!("a plain f32 sum is off by {naive:.1e}")))
+        Ok(Check::at_most(name.as_str(), worst, "relative", DRIFT)
+            .says(format!("a plain f32 sum is off by {naive:.1e}")))
     })?;
 
     let stops = 100;
@@ -153,7 +158,8 @@ fn run(session: &mut Session) -> Result<()> {
     session.measure_each(&name, &kinds, |s, kind, _| {
         let plane = analytic::plane(20.0, SceneTransform::default());
         let tracer = Tracer::new(s.device(), kind, &FlatScene::new(&plane), super::degenerate::NEEDS)?;
-        let (off, seen) = frames_off(&tracer, &plane, &traced(Preset::Balanced), frames, DVec3::new(0.035, 0.015, -0.02), 1.0)?;
+        let (off, seen) =
+            frames_off(&tracer, &plane, &traced(Preset::Balanced), frames, DVec3::new(0.035, 0.015, -0.02), 1.0)?;
         let value = if seen == 0 { f64::NAN } else { off as f64 };
         Ok(Check::at_most(name.as_str(), value, "pixels", 0.0).says(format!("of {seen} are not 1")))
     })?;

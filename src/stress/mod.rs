@@ -101,7 +101,11 @@ impl Summary {
         }
         let more = if failed.len() > 5 { format!(", and {} more", failed.len() - 5) } else { String::new() };
         let checks = if failed.len() == 1 { "check fails" } else { "checks fail" };
-        Err(Error::CheckFailed(format!("{} {checks}: {}{more}", failed.len(), failed[..failed.len().min(5)].join(", "))))
+        Err(Error::CheckFailed(format!(
+            "{} {checks}: {}{more}",
+            failed.len(),
+            failed[..failed.len().min(5)].join(", ")
+        )))
     }
 }
 
@@ -124,7 +128,10 @@ pub fn run(options: &Options, settings: &DeviceSettings, observer: &mut dyn Obse
     session.setup.device().save_pipeline_cache();
     if checks.is_empty() && !options.checks.is_empty() {
         let texts: Vec<_> = options.checks.iter().map(|text| format!("'{text}'")).collect();
-        return Err(Error::Usage(format!("--checks: no check of these sections has {} in its name", texts.join(" or "))));
+        return Err(Error::Usage(format!(
+            "--checks: no check of these sections has {} in its name",
+            texts.join(" or ")
+        )));
     }
     let info = &session.setup.device().info;
     Ok(Summary {
@@ -145,7 +152,10 @@ fn sections(options: &Options) -> Result<Vec<&'static Section>> {
     for name in &options.sections {
         let Some(section) = SECTIONS.iter().find(|s| s.name == *name) else {
             let names: Vec<_> = SECTIONS.iter().map(|s| s.name).collect();
-            return Err(Error::Usage(format!("--sections: there is no section '{name}'; there are {}", names.join(", "))));
+            return Err(Error::Usage(format!(
+                "--sections: there is no section '{name}'; there are {}",
+                names.join(", ")
+            )));
         };
         if section.of_scene != about_scene {
             return Err(Error::Usage(if about_scene {
@@ -199,9 +209,12 @@ mod tests {
         };
         let good = [Check::at_most("a", 0.0, "", 1.0), Check::reported("b", 9.0, ""), Check::not_applicable("c", "no")];
         assert!(summary(good.to_vec()).verdict().is_ok());
-        let bad = summary(vec![Check { tracer: Some(TracerKind::Compute), ..Check::at_most("leaks of a box", 2.0, "", 0.0) }])
-            .verdict()
-            .unwrap_err();
+        let bad = summary(vec![Check {
+            tracer: Some(TracerKind::Compute),
+            ..Check::at_most("leaks of a box", 2.0, "", 0.0)
+        }])
+        .verdict()
+        .unwrap_err();
         assert_eq!((bad.exit_code(), bad.to_string().as_str()), (1, "1 check fails: leaks of a box (compute)"));
     }
 }

@@ -63,7 +63,11 @@ fn other_at(oracle: &Oracle, own: (u32, u32), point: DVec3, normal: DVec3, reach
         // at its edge the neighbour in the same plane is met, too
         let [v, w] = hit.barycentrics;
         let is_within = v.min(w).min(1.0 - v - w) > 1e-9;
-        if id != own && is_within && oracle.facing_normal(&ray, hit).dot(normal) > PARALLEL && found.is_none_or(|f| id < f) {
+        if id != own
+            && is_within
+            && oracle.facing_normal(&ray, hit).dot(normal) > PARALLEL
+            && found.is_none_or(|f| id < f)
+        {
             found = Some(id);
         }
     });

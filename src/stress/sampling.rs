@@ -106,7 +106,8 @@ pub fn held_mean(name: &str, film: &Film, expected: f64, rounding: f64) -> Check
     let (mean, error) = mean_of(film);
     let value = if film.not_finite > 0 { f64::NAN } else { (mean - expected).abs() };
     let bound = ERRORS * error + rounding * expected.abs();
-    let lost = if film.not_finite > 0 { format!("; {} samples are not finite", film.not_finite) } else { String::new() };
+    let lost =
+        if film.not_finite > 0 { format!("; {} samples are not finite", film.not_finite) } else { String::new() };
     Check::at_most(name, value, "of radiance", bound)
         .says(format!("mean {mean:.6}, expected {expected:.6}, standard error {error:.1e}{lost}"))
 }
@@ -120,7 +121,14 @@ pub fn not_finite(film: &Film) -> u64 {
 /// An equirectangular map; `texel(x, y)` is the radiance of a texel.
 pub fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
     let radiance: Arc<[Vec3]> = (0..width * height).map(|k| Vec3::splat(texel(k % width, k / width))).collect();
-    Environment::Map(EnvironmentMap { name: "map".into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY })
+    Environment::Map(EnvironmentMap {
+        name: "map".into(),
+        width,
+        height,
+        radiance,
+        factor: Vec3::ONE,
+        to_map: DMat3::IDENTITY,
+    })
 }
 
 /// Mean radiance of [`furnace`] with white plastic as smooth as a mirror, in `size` by `size`
@@ -162,7 +170,9 @@ fn run(session: &mut Session) -> Result<()> {
     exact.extend([1.33, 1.5, 2.4].map(|ior| (format!("glass, index {ior}"), glass(0.0, ior), many)));
     for (what, material, spp) in exact {
         let (name, scene) = (format!("furnace, {what}"), furnace(1.0, material));
-        session.measure_each(&name, &kinds, |s, kind, w| check_mean(s, kind, &name, &scene, &options(spp), 1.0, 2e-6, w))?;
+        session.measure_each(&name, &kinds, |s, kind, w| {
+            check_mean(s, kind, &name, &scene, &options(spp), 1.0, 2e-6, w)
+        })?;
     }
 
     // Nearly smooth plastic has a closed form.
@@ -170,8 +180,9 @@ fn run(session: &mut Session) -> Result<()> {
     for roughness in [1e-4f32, 1e-3, 1e-2] {
         let name = format!("furnace, plastic of roughness {roughness:e}");
         let scene = furnace(1.0, Material { roughness, ..Material::default() });
-        session
-            .measure_each(&name, &kinds, |s, kind, w| check_mean(s, kind, &name, &scene, &options(many), smooth, 1e-3, w))?;
+        session.measure_each(&name, &kinds, |s, kind, w| {
+            check_mean(s, kind, &name, &scene, &options(many), smooth, 1e-3, w)
+        })?;
     }
 
     // Rough metal loses light between microfacets; glTF's coated plastic gains at grazing angles.
@@ -210,7 +221,8 @@ fn environments(session: &mut Session, kinds: &[TracerKind], options: &PathOptio
     }
     for (what, scene, expected) in &cases {
         let name = format!("furnace in {what}");
-        session.measure_each(&name, kinds, |s, kind, w| check_mean(s, kind, &name, scene, options, *expected, 1e-5, w))?;
+        session
+            .measure_each(&name, kinds, |s, kind, w| check_mean(s, kind, &name, scene, options, *expected, 1e-5, w))?;
     }
     // one texel of 1e6 in a map of 1: two seeds find the same light, and nothing overflows
     for (what, x, y) in [("at the pole", 3, 0), ("at the horizon", 17, 16)] {
@@ -255,7 +267,8 @@ fn lights(session: &mut Session, kinds: &[TracerKind], options: &PathOptions) ->
         ("a light of 1e30", floor(vec![point(at, 1e30)]), reflected * 1e30 * 0.8),
     ];
     for (what, scene, expected) in &cases {
-        session.measure_each(what, kinds, |s, kind, w| check_mean(s, kind, what, scene, options, *expected, 1e-5, w))?;
+        session
+            .measure_each(what, kinds, |s, kind, w| check_mean(s, kind, what, scene, options, *expected, 1e-5, w))?;
     }
     // what is near or small is counted alone: the camera's pixels do not see the same everywhere
     let mut dot = floor(Vec::new());

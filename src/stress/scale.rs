@@ -118,7 +118,9 @@ pub fn closed_forms_at(place: SceneTransform) -> Vec<PlacedForm> {
     let (sin, cos) = (angle * 0.5).sin_cos();
     let (up, normal) = (DVec3::new(sin, cos, 0.0), DVec3::new(-cos, sin, 0.0));
     let point = up + DVec3::Z * 0.5;
-    let look = |eye: DVec3, target: DVec3, up: DVec3, fov: f64| Camera::look_at(place.point(eye), place.point(target), up, fov);
+    let look = |eye: DVec3, target: DVec3, up: DVec3, fov: f64| {
+        Camera::look_at(place.point(eye), place.point(target), up, fov)
+    };
     let (radius, height) = (1.0, 1.25);
     let ball = analytic::sphere_over_plane(radius, height, 60.0, place);
     let gap = 1.0;
@@ -189,7 +191,14 @@ pub fn check_form(
 
 /// Samples of a scene whose value is not `want` as it should be: 0 on the compute tracer. Rays that
 /// leave a closed box may lose one in 100,000 on others, which is their driver's affair.
-pub fn check_exact(setup: &Setup, kind: TracerKind, name: &str, scene: &Scene, want: f32, watch: &mut Watch) -> Result<Check> {
+pub fn check_exact(
+    setup: &Setup,
+    kind: TracerKind,
+    name: &str,
+    scene: &Scene,
+    want: f32,
+    watch: &mut Watch,
+) -> Result<Check> {
     let options = options(setup.effort().pick(48, 192), setup.effort().pick(4, 64), 1.0, f64::INFINITY);
     let image = closed_forms::render(&setup.tracer(kind, scene)?, scene, &scene.cameras[0], &options, watch)?;
     let (covered, off) = closed_forms::samples_off(&image.image.film, image.image.spp, want);
@@ -201,7 +210,11 @@ pub fn check_exact(setup: &Setup, kind: TracerKind, name: &str, scene: &Scene, w
 
 fn place_text(place: &SceneTransform) -> String {
     let far = place.offset.abs().max_element();
-    if far == 0.0 { format!("scale {:e}", place.scale) } else { format!("scale {:e}, {far:e} from the origin", place.scale) }
+    if far == 0.0 {
+        format!("scale {:e}", place.scale)
+    } else {
+        format!("scale {:e}, {far:e} from the origin", place.scale)
+    }
 }
 
 fn run(session: &mut Session) -> Result<()> {
@@ -245,7 +258,9 @@ fn run(session: &mut Session) -> Result<()> {
             }
             let suffix = map.map_or(String::new(), |(name, _)| format!(", {name}"));
             let name = format!("{}{suffix}, {}", form.what, place_text(&place));
-            session.measure_each(&name, &kinds, |s, kind, w| check_form(s, kind, &name, &form, effort.pick(256, 4096), w))?;
+            session.measure_each(&name, &kinds, |s, kind, w| {
+                check_form(s, kind, &name, &form, effort.pick(256, 4096), w)
+            })?;
         }
     }
     super::direct_light::run(session)?;
@@ -257,8 +272,9 @@ fn run(session: &mut Session) -> Result<()> {
 pub fn georeferenced_scene(in_vertices: bool) -> Result<Scene> {
     let place = [4e6, 3e6, -4e6];
     let [x, y, z] = if in_vertices { place } else { [0.0; 3] };
-    let square =
-        |x0: f64, height: f64| [[x0, height, -1.0], [x0, height, 1.0], [x0 + 2.0, height, 1.0], [x0 + 2.0, height, -1.0]];
+    let square = |x0: f64, height: f64| {
+        [[x0, height, -1.0], [x0, height, 1.0], [x0 + 2.0, height, 1.0], [x0 + 2.0, height, -1.0]]
+    };
     let corners: Vec<f32> = [square(-2.0, 0.0), square(0.0, 1e-3)]
         .into_iter()
         .flatten()
@@ -326,7 +342,8 @@ fn georeferenced(session: &mut Session) -> Result<()> {
         let scene = georeferenced_scene(true)?;
         let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("no geometry".into()))?;
         let off = (hi.y - lo.y - 1e-3).abs() * 1e3;
-        Ok(Check::reported(name, off, "mm").says("off: 32 bits do not hold it; put the distance into a node's translation"))
+        Ok(Check::reported(name, off, "mm")
+            .says("off: 32 bits do not hold it; put the distance into a node's translation"))
     })
 }
 

@@ -272,7 +272,12 @@ pub fn data(scene: &Scene) -> Vec<Check> {
         let (distance, ratio) = ((lo + hi).length() * 0.5, anatomy.scale_ratio);
         report("distance from the origin", distance, "units", format!("of a scene {} units large", number(size)));
         let lost = if ratio > 1e7 { "; the shortest are below a rounding of the longest" } else { "" };
-        report("longest edge over shortest", ratio, "", format!("edges differ by {:.0} decades{lost}", ratio.log10().max(0.0)));
+        report(
+            "longest edge over shortest",
+            ratio,
+            "",
+            format!("edges differ by {:.0} decades{lost}", ratio.log10().max(0.0)),
+        );
     }
 
     // Triangles may have hardly any area.
@@ -310,10 +315,12 @@ pub fn data(scene: &Scene) -> Vec<Check> {
     };
     out.push(Check::reported("open edges", open, "edges").says(sentence));
     out.push(Check::reported("edges of more than two triangles", anatomy.crowded_edges as f64, "edges"));
-    out.push(Check::reported("coincident triangles", anatomy.coincident as f64, "triangles").says(match anatomy.coincident {
-        0 => "no ties",
-        _ => "ties: which one a ray meets is not said",
-    }));
+    out.push(Check::reported("coincident triangles", anatomy.coincident as f64, "triangles").says(
+        match anatomy.coincident {
+            0 => "no ties",
+            _ => "ties: which one a ray meets is not said",
+        },
+    ));
     out.push(Check::reported("coincident instances", anatomy.coincident_instances as f64, "instances"));
 
     // Normals, transforms and texels may be wrong.
@@ -485,7 +492,9 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
     let count = (scene.triangle_count() + scene.sphere_count()) as usize;
     let view = match camera::choose(&scene, &camera::Choice::Auto, 1.0) {
         Ok(view) => view,
-        Err(e) => return session.measure(parity_name, None, |_, _| Ok(Check::not_applicable(parity_name, e.to_string()))),
+        Err(e) => {
+            return session.measure(parity_name, None, |_, _| Ok(Check::not_applicable(parity_name, e.to_string())));
+        }
     };
 
     // Compares hits with the oracle, and looks for leaks at shared edges.
@@ -507,7 +516,10 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
         let set = edge_rays(&scene, &oracle, effort.pick(50_000, 10_000_000), 7);
         session.measure_each(leak_name, kinds, |s, kind, w| {
             if set.is_empty() {
-                return Ok(Check::not_applicable(leak_name, "no two opaque triangles share an edge that rays can be aimed at"));
+                return Ok(Check::not_applicable(
+                    leak_name,
+                    "no two opaque triangles share an edge that rays can be aimed at",
+                ));
             }
             let leaks = leaks(&s.tracer(kind, &scene)?, &set, w)?;
             let is_ours = kind == TracerKind::Compute;
@@ -562,7 +574,10 @@ fn path_image(setup: &Setup, kind: TracerKind, name: &str, watch: &mut Watch) ->
     let film = render(&super::scale::path_tracer(setup, kind, &flat)?, &flat, &options, watch)?.image.film;
     let (mean, error) = mean_of(&film);
     let light = if is_dark { ", in a white sky, as it has no light" } else { "" };
-    let sentence =
-        format!("of the film or its samples are not finite; mean radiance {} +- {}{light}", number(mean), number(error));
+    let sentence = format!(
+        "of the film or its samples are not finite; mean radiance {} +- {}{light}",
+        number(mean),
+        number(error)
+    );
     Ok(Check::at_most(name, not_finite(&film) as f64, "values", 0.0).says(sentence))
 }

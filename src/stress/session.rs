@@ -253,6 +253,9 @@ fn tracers(info: &DeviceInfo, settings: &DeviceSettings) -> Result<Vec<TracerKin
     if all.contains(&kind) {
         Ok(vec![kind])
     } else {
-        Err(Error::Device(format!("'{}' has no tracer '{kind}': leave --tracer out, or see `skylit doctor`", info.name)))
+        Err(Error::Device(format!(
+            "'{}' has no tracer '{kind}': leave --tracer out, or see `skylit doctor`",
+            info.name
+        )))
     }
 }

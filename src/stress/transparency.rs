@@ -36,8 +36,9 @@ pub fn cutout(alpha: f32) -> Scene {
 
 /// Counts rays straight down at [`cutout`] that hit.
 pub fn cutout_hits(tracer: &Tracer, control: &mut dyn Control) -> Result<usize> {
-    let rays: Vec<Ray> =
-        (0..100).map(|i| ray(DVec3::new(f64::from(i % 10) - 4.3, 1.0, f64::from(i / 10) - 4.3), DVec3::NEG_Y)).collect();
+    let rays: Vec<Ray> = (0..100)
+        .map(|i| ray(DVec3::new(f64::from(i % 10) - 4.3, 1.0, f64::from(i / 10) - 4.3), DVec3::NEG_Y))
+        .collect();
     Ok(trace(tracer, &rays, Mode::Closest, 1, control)?.0.iter().filter(|h| h.is_hit()).count())
 }
 
@@ -113,7 +114,8 @@ fn run(session: &mut Session) -> Result<()> {
 
 fn glasses(session: &mut Session) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    let options = PathOptions { samples: SampleSettings::new([16, 16], effort.pick(64, 16_384), 3), ..Default::default() };
+    let options =
+        PathOptions { samples: SampleSettings::new([16, 16], effort.pick(64, 16_384), 3), ..Default::default() };
     let mut cases = Vec::new();
     // a camera within glass, and one that looks along a rod in which light is reflected totally
     let mut within = furnace(1.0, glass(0.0, 1.5));
@@ -134,7 +136,8 @@ fn glasses(session: &mut Session) -> Result<()> {
     cases.push(("64 blended layers", scene, left));
     for (name, scene, expected) in &cases {
         debug_assert!(scene.instances.iter().all(|i| i.object_to_world == DAffine3::IDENTITY));
-        session.measure_each(name, &kinds, |s, kind, w| check_mean(s, kind, name, scene, &options, *expected, 1e-5, w))?;
+        session
+            .measure_each(name, &kinds, |s, kind, w| check_mean(s, kind, name, scene, &options, *expected, 1e-5, w))?;
     }
     Ok(())
 }

@@ -65,8 +65,9 @@ fn run(session: &mut Session) -> Result<()> {
     }
     scenes.extend(hard_leak_scenes(effort.pick(6, 8), effort.pick(200, 5000)));
     // drivers' own tracers are slower on CPUs, and their leaks are theirs
-    let count =
-        |kind| if kind == TracerKind::Compute { effort.pick(1_000_000, 100_000_000) } else { effort.pick(150_000, 10_000_000) };
+    let count = |kind| {
+        if kind == TracerKind::Compute { effort.pick(1_000_000, 100_000_000) } else { effort.pick(150_000, 10_000_000) }
+    };
     let kinds = session.setup().tracers();
 
     // Every scene has its check, and every tracer the sum of all.

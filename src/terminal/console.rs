@@ -104,14 +104,18 @@ impl Console {
 /// Returns true for characters that a terminal obeys instead of showing them: control characters,
 /// line and paragraph separators, and those that reorder a line.
 fn is_obeyed(c: char) -> bool {
-    let reorders = matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let reorders =
+        matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control() || reorders
 }
 
 /// Replaces line breaks, other characters that a terminal obeys and runs of white space by single
 /// spaces.
 pub fn one_line(text: &str) -> String {
-    text.split(|c: char| c.is_whitespace() || is_obeyed(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
+    text.split(|c: char| c.is_whitespace() || is_obeyed(c))
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// Replaces each character that a terminal obeys by a space, except those of `kept`: columns stay
@@ -157,8 +161,8 @@ fn write(text: &str) -> Result<()> {
 
 /// Writes a JSON record to stdout, on one line.
 pub fn json(value: &impl Serialize) -> Result<()> {
-    let text =
-        serde_json::to_string(value).map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
+    let text = serde_json::to_string(value)
+        .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
     write(&(escaped(&text) + "\n"))
 }
 

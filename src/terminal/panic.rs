@@ -14,7 +14,8 @@ static FIRST: Mutex<Option<String>> = Mutex::new(None);
 pub fn install() {
     set_hook(Box::new(|info| {
         let payload = info.payload();
-        let what = payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+        let what =
+            payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
         let what = what.unwrap_or("unknown reason");
         let place = info.location().map(|l| format!(" at {}:{}", l.file(), l.line())).unwrap_or_default();
         let message = format!("internal error: {what}{place}; this is a bug in skylit, please report it");
@@ -32,6 +33,8 @@ pub fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     // only the message is used after a panic
     catch_unwind(AssertUnwindSafe(f)).map_err(|_| {
         let first = FIRST.lock().ok().and_then(|mut m| m.take());
-        super::console::one_line(&first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()))
+        super::console::one_line(
+            &first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()),
+        )
     })
 }

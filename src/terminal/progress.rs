@@ -123,7 +123,8 @@ impl LinePace {
 
     fn is_due(&mut self, elapsed: Duration, share: f64) -> bool {
         let waited = elapsed.saturating_sub(self.last.0);
-        let is_due = waited >= self.interval && (share - self.last.1 >= LINE_SHARE || waited >= self.interval * MAX_WAIT);
+        let is_due =
+            waited >= self.interval && (share - self.last.1 >= LINE_SHARE || waited >= self.interval * MAX_WAIT);
         // what is done is soon reported otherwise
         let is_due = is_due && share < 1.0;
         if is_due {
@@ -136,8 +137,11 @@ impl LinePace {
 /// `rendering: 30 % after 12 s, about 28 s left`.
 fn line_text(label: &str, elapsed: Duration, share: f64) -> String {
     let seconds = elapsed.as_secs_f64();
-    let left =
-        if share > 0.0 { format!(", about {} left", duration_text(seconds * (1.0 - share) / share)) } else { String::new() };
+    let left = if share > 0.0 {
+        format!(", about {} left", duration_text(seconds * (1.0 - share) / share))
+    } else {
+        String::new()
+    };
     format!("{label}: {:.0} % after {}{left}", 100.0 * share, duration_text(seconds))
 }
 

@@ -35,8 +35,8 @@ impl Attributes {
     /// Baked normals and tangents differ between submeshes of one mesh; all other attributes are
     /// shared.
     fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
-        let baked =
-            matches!(attribute, Attribute::Normals | Attribute::Tangents(_)) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
+        let baked = matches!(attribute, Attribute::Normals | Attribute::Tangents(_))
+            && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
     }
 
@@ -91,7 +91,9 @@ fn tangents(t: &TriangleMesh, which: usize) -> &[Vec4] {
 
 fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute) -> Cow<'a, [u8]> {
     match attribute {
-        Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
+        Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => {
+            Cow::Borrowed(bytemuck::cast_slice(&t.normals))
+        }
         Attribute::Normals => {
             let m = part.to_group.matrix3.inverse().transpose();
             let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).as_vec3()).collect();

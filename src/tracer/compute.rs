@@ -29,7 +29,10 @@ impl Trees {
             )));
         }
         if !flat.motion.is_none() && !matches!(kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) {
-            return Err(Error::Usage(format!("traversal '{kernel}' is for static scenes; use --traversal {}", Kernel::Wide)));
+            return Err(Error::Usage(format!(
+                "traversal '{kernel}' is for static scenes; use --traversal {}",
+                Kernel::Wide
+            )));
         }
         Ok(match kernel {
             Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),

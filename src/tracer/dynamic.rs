@@ -160,7 +160,9 @@ impl Dynamic {
         let mut moved = Vec::with_capacity(changes.instances.len());
         for &(i, object_to_world) in &changes.instances {
             let Some(&entry) = self.entries.get(&i) else {
-                return Err(Error::Usage(format!("instance {i} was not declared as moving: list it in Motion::instances")));
+                return Err(Error::Usage(format!(
+                    "instance {i} was not declared as moving: list it in Motion::instances"
+                )));
             };
             let to_world = DAffine3 { translation: object_to_world.translation - self.origin, ..object_to_world };
             let finite = |t: &DAffine3| rows(t).iter().flatten().all(|x| x.is_finite());
@@ -224,7 +226,8 @@ impl Dynamic {
             let (before, way) = deformed.unwrap_or((now, 0.0));
             let (from, to) = (transformed_bounds(&old, before), transformed_bounds(&new, now));
             let scale = new.matrix3.x_axis.length().max(new.matrix3.y_axis.length()).max(new.matrix3.z_axis.length());
-            let carried = corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
+            let carried =
+                corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
             let half = 0.5 * (to.max - to.min).length().max(f32::MIN_POSITIVE);
             out.push(MovedBounds { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
         }

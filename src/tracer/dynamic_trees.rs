@@ -112,12 +112,9 @@ pub(super) fn reserve(trees: &Trees, flat: &FlatScene) -> (TreeCapacities, TreeD
             (2 * flat.instances.len() + 1, max_depth(t.depth, flat.instances.len()))
         }
     });
-    let groups = trees
-        .groups
-        .iter()
-        .zip(&flat.groups)
-        .zip(deform)
-        .map(|((t, g), more)| (capacity_of(t, more), if more { max_depth(t.depth, g.primitive_count) } else { t.depth }));
+    let groups = trees.groups.iter().zip(&flat.groups).zip(deform).map(|((t, g), more)| {
+        (capacity_of(t, more), if more { max_depth(t.depth, g.primitive_count) } else { t.depth })
+    });
     let (capacities, depths) = groups.unzip();
     (TreeCapacities { top: top.0, groups: capacities }, TreeDepths { top: top.1, groups: depths })
 }
@@ -133,8 +130,10 @@ impl DynamicTrees {
             depth,
             bounds: t.bounds.unwrap_or(Aabb::EMPTY),
             sah_cost: t.sah_cost,
-            changing: changes
-                .then(|| Changing { plan: RefitPlan::new(&t.blocks, 0), policy: RefitPolicy::new(t.sah_cost, seconds) }),
+            changing: changes.then(|| Changing {
+                plan: RefitPlan::new(&t.blocks, 0),
+                policy: RefitPolicy::new(t.sah_cost, seconds),
+            }),
         };
         let mut at = capacities.top;
         let groups = (0..trees.groups.len()).map(|k| {
@@ -179,7 +178,8 @@ impl DynamicTrees {
         let start = Instant::now();
         if self.groups[group].should_rebuild() {
             let triangles = Triangles { positions: positions.to_vec(), indices: deforming.indices.clone() };
-            let built = triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default, Some(self.groups[group].depth));
+            let built =
+                triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default, Some(self.groups[group].depth));
             let seconds = start.elapsed().as_secs_f64();
             if built.blocks.len() > self.groups[group].capacity {
                 self.grow(device, nodes, group, spare_capacity(built.blocks.len()))?;
@@ -192,7 +192,8 @@ impl DynamicTrees {
             Some(used) if !used[v] => 0.0,
             _ => p.abs().max_element(),
         };
-        let pad = reach_padding(positions.par_iter().with_min_len(4096).enumerate().map(reach).reduce(|| 0.0, f32::max));
+        let pad =
+            reach_padding(positions.par_iter().with_min_len(4096).enumerate().map(reach).reduce(|| 0.0, f32::max));
         let leaf = |block: &mut Block| rewrite_pair(block, positions, &deforming.indices);
         self.groups[group].refit(blocks(&mut self.copy, nodes)?, pad, leaf, start);
         self.flush(nodes, self.groups[group].range())?;
@@ -241,8 +242,11 @@ impl DynamicTrees {
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
         for p in instances {
             let g = &self.groups[p.group];
-            let share =
-                if self.top.is_some() { transformed_bounds(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
+            let share = if self.top.is_some() {
+                transformed_bounds(&p.to_world, g.bounds).half_area() as f64 / whole
+            } else {
+                1.0
+            };
             visits[p.group] += share * g.sah_cost;
         }
         let top_visits = self.top.as_ref().map_or(0.0, |t| t.sah_cost);
@@ -338,8 +342,10 @@ impl Tree {
             .with_min_len(4096)
             .zip(&built.blocks)
             .for_each(|(to, b)| *to = wide::rebased(*b, base));
-        self.changing =
-            Some(Changing { plan: RefitPlan::new(&built.blocks, 0), policy: RefitPolicy::new(built.sah_cost, seconds) });
+        self.changing = Some(Changing {
+            plan: RefitPlan::new(&built.blocks, 0),
+            policy: RefitPolicy::new(built.sah_cost, seconds),
+        });
     }
 }
 

@@ -53,8 +53,11 @@ pub struct GpuScene {
 impl GpuScene {
     /// Uploads the data that `needs` and the scene itself require.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
-        let needs =
-            Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading && !needs.white, ..needs };
+        let needs = Needs {
+            normals: needs.normals || needs.shading,
+            albedo: needs.albedo || needs.shading && !needs.white,
+            ..needs
+        };
 
         // vertices, indices and their attributes
         let groups = flat.groups.iter().map(|g| GroupBuffers::upload(device, flat, g)).collect::<Result<Vec<_>>>()?;
@@ -165,7 +168,12 @@ impl GpuScene {
 
     /// Before an update that moves these TLAS instances, now at `placements`, and deforms these
     /// groups.
-    pub(super) fn begin_update(&mut self, instances: &[TlasInstance], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
+    pub(super) fn begin_update(
+        &mut self,
+        instances: &[TlasInstance],
+        moving: Vec<usize>,
+        deforming: Vec<usize>,
+    ) -> Result<()> {
         let groups = &self.groups;
         match &mut self.motion {
             Some(motion) => motion.begin(instances, |g| &groups[g].positions, moving, deforming),
@@ -231,7 +239,11 @@ impl GpuScene {
 }
 
 /// The records of all submeshes, and the index of each group's first.
-fn submesh_records(flat: &FlatScene, groups: &[GroupBuffers], attributes: &Attributes) -> (Vec<SubmeshRecord>, Vec<u32>) {
+fn submesh_records(
+    flat: &FlatScene,
+    groups: &[GroupBuffers],
+    attributes: &Attributes,
+) -> (Vec<SubmeshRecord>, Vec<u32>) {
     let (mut submeshes, mut first_submesh) = (Vec::new(), Vec::new());
     for (group, buffers) in flat.groups.iter().zip(groups) {
         first_submesh.push(submeshes.len() as u32);
@@ -274,7 +286,8 @@ fn instance_records(flat: &FlatScene, groups: &[GroupBuffers], first_submesh: &[
             ..Default::default()
         })
         .collect();
-    let is_finite = |i: &InstanceRecord| i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite());
+    let is_finite =
+        |i: &InstanceRecord| i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite());
     if let Some(bad) = instances.iter().position(|i| !is_finite(i)) {
         let name = flat.instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
         return Err(Error::Scene(format!(

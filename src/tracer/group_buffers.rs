@@ -30,7 +30,11 @@ impl GroupBuffers {
 
     /// Size in device memory, in bytes.
     pub fn bytes(&self) -> u64 {
-        [Some(&self.positions), self.indices.as_ref(), self.submesh_of.as_ref()].into_iter().flatten().map(Buffer::size).sum()
+        [Some(&self.positions), self.indices.as_ref(), self.submesh_of.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(Buffer::size)
+            .sum()
     }
 }
 
@@ -94,7 +98,8 @@ fn write_submeshes(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buf
     }
     let ends = group.submeshes.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
     let sizes: Vec<_> = group.submeshes.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
-    let mut buffer = Buffer::new(device, "submesh of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
+    let mut buffer =
+        Buffer::new(device, "submesh of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
     let mut cursor = Cursor::new(sizes.into_iter());
     buffer.fill(4 * group.primitive_count as u64, 4, |_, bytes| {
         for out in bytes.chunks_exact_mut(4) {

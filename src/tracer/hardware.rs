@@ -48,7 +48,8 @@ struct Deforming {
 
 impl Deforming {
     fn input<'a>(&self, buffers: &'a GroupBuffers) -> Result<BottomLevelInput<'a>> {
-        let indices = buffers.indices.as_ref().ok_or_else(|| Error::Vulkan("a group that deforms has no indices".into()))?;
+        let indices =
+            buffers.indices.as_ref().ok_or_else(|| Error::Vulkan("a group that deforms has no indices".into()))?;
         Ok(BottomLevelInput::Triangles {
             positions: &buffers.positions,
             vertex_count: self.vertex_count,
@@ -81,7 +82,12 @@ impl Structures {
             if let Some(d) = deforming {
                 let start = Instant::now();
                 let input = d.input(buffers)?;
-                bottom.push(AccelerationStructure::changing_bottom_level(device, &mut commands, "bottom level", &input)?);
+                bottom.push(AccelerationStructure::changing_bottom_level(
+                    device,
+                    &mut commands,
+                    "bottom level",
+                    &input,
+                )?);
                 d.policy = RefitPolicy::new(1.0, start.elapsed().as_secs_f64());
                 continue;
             }
@@ -116,7 +122,12 @@ impl Structures {
                 };
                 let mut transform = [0.0; 12];
                 transform.copy_from_slice(rows(&p.to_world).as_flattened());
-                AccelerationStructureInstance { transform, index: k as u32, hit_group, bottom_level: bottom[p.group].address() }
+                AccelerationStructureInstance {
+                    transform,
+                    index: k as u32,
+                    hit_group,
+                    bottom_level: bottom[p.group].address(),
+                }
             })
             .collect();
         let top = AccelerationStructure::top_level(device, &mut commands, &entries)?;

@@ -110,8 +110,12 @@ pub(super) fn record(flat: &FlatScene, group: &BlasGroup, primitive: u32) -> Tri
     let k = primitive as usize - part.first_primitive;
     if group.spheres {
         let s = flat.sphere(part, k);
-        let sphere =
-            SphereRecord { center: s.center.to_array(), radius: s.radius, number: primitive | SPHERE, ..Default::default() };
+        let sphere = SphereRecord {
+            center: s.center.to_array(),
+            radius: s.radius,
+            number: primitive | SPHERE,
+            ..Default::default()
+        };
         return bytemuck::cast(sphere);
     }
     let flag = if part.alpha_tested { ALPHA_TESTED } else { 0 };

@@ -55,7 +55,10 @@ impl TracerKind {
     /// The tracer that `auto` chooses on a device, and the reason.
     pub fn auto(info: &DeviceInfo) -> (TracerKind, String) {
         if info.is_cpu() {
-            (TracerKind::Compute, "the device is a CPU, where ray-tracing extensions are slower than the software BVH".into())
+            (
+                TracerKind::Compute,
+                "the device is a CPU, where ray-tracing extensions are slower than the software BVH".into(),
+            )
         } else if TracerKind::Pipeline.is_supported_by(info) {
             (TracerKind::Pipeline, "the device has VK_KHR_ray_tracing_pipeline".into())
         } else if TracerKind::Query.is_supported_by(info) {

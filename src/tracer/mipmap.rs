@@ -47,7 +47,11 @@ fn unorm16(texel: &Vec4) -> [u16; 4] {
 /// before.
 fn means(texture: &Texture, texels: Texels) -> Vec<Vec4> {
     let texel = |i: usize| {
-        let c = Vec4::from_array(if texels == Texels::Linear { texture.texels.get(i) } else { texture.texels.decode_srgb(i) });
+        let c = Vec4::from_array(if texels == Texels::Linear {
+            texture.texels.get(i)
+        } else {
+            texture.texels.decode_srgb(i)
+        });
         if texels == Texels::Covered { (c.truncate() * c.w).extend(c.w) } else { c }
     };
     let mut out = Vec::new();
@@ -147,12 +151,14 @@ mod tests {
                 let value = |c: usize| {
                     let texel = |p: [f32; 4]| {
                         let v = f64::from(p[c]);
-                        let linear = if c == 3 || texels == Texels::Linear { v } else { f64::from(srgb_decode(v as f32)) };
+                        let linear =
+                            if c == 3 || texels == Texels::Linear { v } else { f64::from(srgb_decode(v as f32)) };
                         if texels == Texels::Covered && c < 3 { linear * f64::from(p[3]) } else { linear }
                     };
                     mean(&t.texels.iter().map(texel).collect::<Vec<_>>())
                 };
-                let ends = record.first[..record.last as usize].iter().skip(1).map(|&n| n as usize).chain([levels.len()]);
+                let ends =
+                    record.first[..record.last as usize].iter().skip(1).map(|&n| n as usize).chain([levels.len()]);
                 for (&first, end) in record.first[..record.last as usize].iter().zip(ends) {
                     for c in 0..4 {
                         let found = mean(&channel(&levels[first as usize..end], c));

@@ -173,8 +173,13 @@ impl Tracer {
         let start = Instant::now();
         let (hierarchy, prepared) = match kind {
             TracerKind::Compute => {
-                let specs =
-                    PrecompiledPipelines::expected(&device.info, features, options, &build.streams, flat.primitive_count());
+                let specs = PrecompiledPipelines::expected(
+                    &device.info,
+                    features,
+                    options,
+                    &build.streams,
+                    flat.primitive_count(),
+                );
                 let is_needed = !specs.is_empty();
                 std::thread::scope(|scope| {
                     let compile = || PrecompiledPipelines::compile(device, specs);
@@ -344,7 +349,9 @@ impl Tracer {
                 let all = s.clone().and(constants);
                 let (rays_per_lane, _) = lane_budget(info);
                 match h.kernel {
-                    Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &all, rays_per_lane),
+                    Kernel::Nearest | Kernel::Direction => {
+                        Stream::reference(&self.device, shaders, &all, rays_per_lane)
+                    }
                     Kernel::Brute => Stream::brute(&self.device, shaders, &all),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
                         if precompiled::in_packets(info, h.kernel, shaders) {
@@ -357,7 +364,9 @@ impl Tracer {
                     }
                 }
             }
-            Structure::Hardware { .. } if self.kind == TracerKind::Query => Stream::query(&self.device, shaders, &scene()),
+            Structure::Hardware { .. } if self.kind == TracerKind::Query => {
+                Stream::query(&self.device, shaders, &scene())
+            }
             Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features, &scene()),
         }
     }
@@ -370,7 +379,10 @@ impl Tracer {
     /// [`Error::Usage`] for tracers and traversals that cannot count, and those of the device.
     pub fn counting_kernel(&self, shader: &ComputeShader, user: &str) -> Result<ComputePipeline> {
         let options = self.compute_options().ok_or_else(|| {
-            Error::Usage(format!("{user} needs the compute tracer, and '{}' cannot count: add --tracer compute", self.kind))
+            Error::Usage(format!(
+                "{user} needs the compute tracer, and '{}' cannot count: add --tracer compute",
+                self.kind
+            ))
         })?;
         match &self.structure {
             Structure::Compute(h) if matches!(h.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) => {

@@ -110,7 +110,12 @@ pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShad
 }
 
 /// The pipeline of the fast kernels that traces the stream.
-pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> PipelineSpec {
+pub(super) fn large(
+    info: &DeviceInfo,
+    kernel: Kernel,
+    shaders: &'static StreamShaders,
+    s: &Specialization,
+) -> PipelineSpec {
     let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
     let (name, shader) = match packet {
         Some(shader) => (shaders.name(), shader),

@@ -59,7 +59,8 @@ impl PreviousFrame {
         moving: Vec<usize>,
         deforming: Vec<usize>,
     ) -> Result<()> {
-        let (moved, deformed) = (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
+        let (moved, deformed) =
+            (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
         let mut changed = false;
         for &k in moved.iter().chain(&self.moved) {
             self.records[k].previous_group_to_world = rows(&instances[k].to_world);

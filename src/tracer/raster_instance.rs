@@ -59,7 +59,13 @@ impl RasterGeometry {
         if chunks.len() == 1 {
             chunks.clear();
         }
-        Self { spheres: group.spheres, primitives: primitives as u32, opaque: group.opaque_count as u32, bounds, chunks }
+        Self {
+            spheres: group.spheres,
+            primitives: primitives as u32,
+            opaque: group.opaque_count as u32,
+            bounds,
+            chunks,
+        }
     }
 
     /// Recomputes the bounds after its vertices have moved.

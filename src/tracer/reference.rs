@@ -61,7 +61,8 @@ impl Trees {
             None => roots.first().copied().unwrap_or(bvh2::EMPTY),
         };
         let top_nodes = self.top.iter().flat_map(|t| padded(t, |c| top_reference(t, c)));
-        let group_nodes = self.groups.iter().zip(bases).flat_map(|(t, b)| padded(t, move |c| bvh2::rebase(c, b.0, b.1)));
+        let group_nodes =
+            self.groups.iter().zip(bases).flat_map(|(t, b)| padded(t, move |c| bvh2::rebase(c, b.0, b.1)));
         let nodes = write_records(device, "hierarchy nodes", node as u64, &mut top_nodes.chain(group_nodes))?;
         let mut records = self
             .groups

@@ -127,14 +127,18 @@ impl DeviceSettings {
     /// [`Error::Usage`] for an option of the compute tracer with another tracer, and for a build or
     /// cache option with a traversal that has no BVH or does not cache it.
     pub fn check(&self) -> Result<()> {
-        if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) = (self.tracer, self.compute_only_option()) {
+        if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) =
+            (self.tracer, self.compute_only_option())
+        {
             return Err(Error::Usage(format!(
                 "{option} applies to the compute tracer only: leave it out, or use --tracer compute"
             )));
         }
         let option = match self.traversal {
             Some(Kernel::Brute) if self.build() != BuildChoice::Auto => Some("--build"),
-            Some(Kernel::Brute | Kernel::Nearest | Kernel::Direction) if self.bvh_cache.is_some() => Some("--bvh-cache"),
+            Some(Kernel::Brute | Kernel::Nearest | Kernel::Direction) if self.bvh_cache.is_some() => {
+                Some("--bvh-cache")
+            }
             _ => None,
         };
         match (option, self.traversal) {
@@ -154,7 +158,9 @@ impl DeviceSettings {
     pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
         self.check()?;
         let (kind, why) = match (self.tracer.unwrap_or_default(), self.compute_only_option()) {
-            (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} applies to this tracer only")),
+            (TracerChoice::Auto, Some(option)) => {
+                (TracerKind::Compute, format!("{option} applies to this tracer only"))
+            }
             (choice, _) => choice.on(info),
         };
         let options = ComputeOptions {
@@ -196,7 +202,8 @@ mod tests {
         ] {
             assert!(refused(line).is_some_and(|e| e.starts_with(about)), "{line}: {:?}", refused(line));
         }
-        for line in ["", "--tracer pipeline", "--tracer compute --build best --bvh-cache d", "--traversal nearest --build fast"]
+        for line in
+            ["", "--tracer pipeline", "--tracer compute --build best --bvh-cache d", "--traversal nearest --build fast"]
         {
             assert_eq!(refused(line), None, "{line}");
         }

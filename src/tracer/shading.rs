@@ -13,7 +13,8 @@ use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 
 // shaders/path/shading.glsl loads the first four words together
-const _: () = assert!(std::mem::offset_of!(ShadingRecord, emission) == 0 && std::mem::offset_of!(ShadingRecord, model) == 12);
+const _: () =
+    assert!(std::mem::offset_of!(ShadingRecord, emission) == 0 && std::mem::offset_of!(ShadingRecord, model) == 12);
 
 /// Number of textures of a material beside that of the base colour, in the order of
 /// [`TextureFeature`].
@@ -34,7 +35,9 @@ fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
 fn model(m: &Material) -> Option<BsdfModel> {
     match m.kind {
         _ if m.unlit => None,
-        MaterialKind::Matte | MaterialKind::MetallicRoughness if m.parameter("sigma").is_some_and(|sigma| sigma > 0.0) => {
+        MaterialKind::Matte | MaterialKind::MetallicRoughness
+            if m.parameter("sigma").is_some_and(|sigma| sigma > 0.0) =>
+        {
             Some(BsdfModel::OrenNayar)
         }
         MaterialKind::MetallicRoughness => Some(BsdfModel::Gltf),
@@ -108,7 +111,11 @@ fn walls(m: &Material) -> TransmissionMode {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
             // glTF's index of refraction 0 does not refract: such a material transmits straight on,
             // as a thin wall
-            if m.transmission.thickness > 0.0 && m.ior != 0.0 { TransmissionMode::Volume } else { TransmissionMode::Thin }
+            if m.transmission.thickness > 0.0 && m.ior != 0.0 {
+                TransmissionMode::Volume
+            } else {
+                TransmissionMode::Thin
+            }
         }
         _ => TransmissionMode::Opaque,
     }
@@ -179,9 +186,11 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
         }
 
         // a feature is compiled in only if a material needs it
-        let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
+        let normal_maps =
+            m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
         let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
-        let varies = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
+        let varies =
+            matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
         for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
             textures.insert_if(slot.is_some(), feature);
         }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, ComputePipeline, Device, DeviceInfo, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::gpu::{
+    Buffer, ComputePipeline, Device, DeviceInfo, HitShaders, RayTracingPipeline, Recorder, Specialization,
+};
 use crate::interface::constants;
 use crate::interface::records::hierarchy::{LaunchHit, RESUMED, UNFINISHED};
 pub use crate::interface::records::ray::Push;
@@ -99,9 +101,10 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
         .set(constants::HAS_COVERAGE, features.stochastic_alpha)
         .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
     match features.shading {
-        Some(shading) => {
-            s.set_all(shading.bsdfs.constants()).set_all(shading.materials.constants()).set_all(shading.textures.constants())
-        }
+        Some(shading) => s
+            .set_all(shading.bsdfs.constants())
+            .set_all(shading.materials.constants())
+            .set_all(shading.textures.constants()),
         None => s,
     }
 }
@@ -124,8 +127,9 @@ fn compile(
     variant: Variant,
     s: &Specialization,
 ) -> Result<Arc<ComputePipeline>> {
-    let shader =
-        shaders.variant(variant).ok_or_else(|| Error::Usage(format!("'{}' is not made for {variant:?}", shaders.name())))?;
+    let shader = shaders
+        .variant(variant)
+        .ok_or_else(|| Error::Usage(format!("'{}' is not made for {variant:?}", shaders.name())))?;
     ComputePipeline::new(device, shaders.name(), &shader, s).map(Arc::new)
 }
 
@@ -212,15 +216,20 @@ impl Stream {
             triangle_any: features.alpha.then_some(&shaders::TRIANGLE_ANY),
             sphere: features.spheres.then_some([&shaders::SPHERE_CLOSEST, &shaders::SPHERE_INTERSECTION]),
         };
-        let raygen =
-            stream.variant(Variant::Raygen).ok_or_else(|| Error::Usage(format!("'{}' has no raygen shader", stream.name())))?;
+        let raygen = stream
+            .variant(Variant::Raygen)
+            .ok_or_else(|| Error::Usage(format!("'{}' has no raygen shader", stream.name())))?;
         let pipeline = RayTracingPipeline::new(device, stream.name(), &raygen, &shared, s)?;
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
     /// A stream for camera rays whose pixels were rasterized. [`Push::rays`] is then the address of
     /// the rasterized ids ([`crate::raster`]).
-    pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn rasterized(
+        device: &Arc<Device>,
+        shaders: &'static StreamShaders,
+        s: &Specialization,
+    ) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!(
                 "the rays of '{}' are not camera rays: they cannot be rasterized",
@@ -252,7 +261,8 @@ impl Stream {
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
                 let run = if *rays_per_group == LANES { RUN } else { 1 };
-                recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(*rays_per_group), run)));
+                recorder
+                    .timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(*rays_per_group), run)));
             }
             Pipeline::Packets(pipeline) => {
                 let groups = spread(push.count.div_ceil(LANES * PACKET_RAYS), 1);
@@ -261,7 +271,11 @@ impl Stream {
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
                 // at most as many rays a launch as the memory holds
                 let most = memory.capacity;
-                debug_assert!(in_memory || push.count <= most, "{}: results would overwrite each other", self.shaders.name());
+                debug_assert!(
+                    in_memory || push.count <= most,
+                    "{}: results would overwrite each other",
+                    self.shaders.name()
+                );
                 let [generating, tracing, delivering] = self.shaders.steps();
                 for first in (0..push.count).step_by(most as usize) {
                     let mut push = Push { first: push.first + first, count: most.min(push.count - first), ..*push };
@@ -302,13 +316,16 @@ impl Stream {
                     recorder.barrier();
 
                     // results
-                    recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
+                    recorder
+                        .timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
             }
             Pipeline::Known(pipeline) => {
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(LANES), RUN)));
             }
-            Pipeline::Rasterized(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
+            Pipeline::Rasterized(pipeline) => {
+                recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES)))
+            }
             Pipeline::RayTracing(pipeline) => {
                 let rays = push.count.next_multiple_of(LANES * RUN * SPREAD);
                 recorder.timed(pass, |r| r.trace_rays(pipeline, push, rays));

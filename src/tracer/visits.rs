@@ -105,7 +105,8 @@ impl VisitCounter {
 
             // the nearest child comes next, or the first along the ray
             if let Some((node, slots)) = stack.last_mut() {
-                let along = (0..8u32).rev().map(|rank| rank ^ octant).find(|&slot| *slots >> slot & 1 == 1).unwrap_or(0);
+                let along =
+                    (0..8u32).rev().map(|rank| rank ^ octant).find(|&slot| *slots >> slot & 1 == 1).unwrap_or(0);
                 let slot = nearest.filter(|_| !any).unwrap_or(along);
                 *slots &= !(1 << slot);
                 next = wide::children(&self.blocks[*node]).find(|c| c.0 as u32 == slot).map(|c| c.1 as usize);
@@ -150,7 +151,8 @@ mod tests {
         let flat = FlatScene::new(&scene);
         let counter = VisitCounter::new(&flat).unwrap();
         let bounds = flat.bounds();
-        let away = Ray { origin: (bounds.max + 1.0).to_array(), tmin: 0.0, direction: [1.0, 1.0, 1.0], tmax: f32::INFINITY };
+        let away =
+            Ray { origin: (bounds.max + 1.0).to_array(), tmin: 0.0, direction: [1.0, 1.0, 1.0], tmax: f32::INFINITY };
         assert_eq!(counter.mean(&[away], false), Visits { nodes: 1.0, leaves: 0.0 });
         let through = Ray { direction: [-1.0, -1.0, -1.0], ..away };
         let (closest, any) = (counter.mean(&[through], false), counter.mean(&[through], true));

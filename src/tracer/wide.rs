@@ -25,8 +25,8 @@ use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{
-    ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, STACK_IN_REGISTERS, SUSPENDED_RAYS, SUSPENDED_START, SUSPENDED_WORDS,
-    SphereLeaf, TriangleLeaf,
+    ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, STACK_IN_REGISTERS, SUSPENDED_RAYS, SUSPENDED_START,
+    SUSPENDED_WORDS, SphereLeaf, TriangleLeaf,
 };
 use crate::ray::Ray;
 use crate::scene::Geometry;
@@ -111,7 +111,11 @@ impl Trees {
 
         // each tree is moved to its place, with room to grow where it may change
         let trees = self.top.iter().map(|t| (t, 0, capacities.top)).chain(
-            self.groups.iter().zip(roots.iter().copied()).zip(&capacities.groups).map(|((t, by), &capacity)| (t, by, capacity)),
+            self.groups
+                .iter()
+                .zip(roots.iter().copied())
+                .zip(&capacities.groups)
+                .map(|((t, by), &capacity)| (t, by, capacity)),
         );
         let reserved = trees.flat_map(|(t, by, capacity)| {
             let free = std::iter::repeat_n(Block::default(), capacity - t.blocks.len());
@@ -389,8 +393,10 @@ pub(super) struct Triangles {
 
 impl Triangles {
     fn from_group(flat: &FlatScene, group: &BlasGroup) -> Self {
-        let mut out =
-            Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
+        let mut out = Self {
+            positions: Vec::with_capacity(group.vertex_count),
+            indices: Vec::with_capacity(group.primitive_count),
+        };
         for part in &group.submeshes {
             let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry else { continue };
             out.positions.par_extend((0..t.positions.len()).into_par_iter().map(|v| flat.vertex(part, v)));
@@ -656,8 +662,8 @@ mod tests {
                     assert_eq!(id & ALPHA_TESTED != 0, number(id) >= group.opaque_count, "{name}: {id:x}");
                     let corners = if k == 0 { [0, 1, 2] } else { [0, 2, 3] };
                     let (second, third) = (leaf.order >> (4 * k) & 3, leaf.order >> (4 * k + 2) & 3);
-                    let order =
-                        [3 - second - third, second, third].map(|p| leaf.corners[corners[p as usize]].map(f32::to_bits));
+                    let order = [3 - second - third, second, third]
+                        .map(|p| leaf.corners[corners[p as usize]].map(f32::to_bits));
                     let own = triangles.corners(triangles.indices[number(id)]).map(|v| v.to_array().map(f32::to_bits));
                     assert_eq!(order, own, "{name}: triangle {}", number(id));
                 }
@@ -690,7 +696,8 @@ mod tests {
         for (k, t) in triangles.indices.iter().enumerate() {
             let first = own.positions.len() as u32;
             own.indices.push([first, first + 1, first + 2]);
-            own.positions.extend(triangles.corners(*t).map(|p| if k % 2 == 0 { p } else { -Vec3::ZERO + p * Vec3::ONE }));
+            own.positions
+                .extend(triangles.corners(*t).map(|p| if k % 2 == 0 { p } else { -Vec3::ZERO + p * Vec3::ONE }));
         }
         own.positions.iter_mut().skip(9).step_by(4).for_each(|p| p.z = if p.z == 0.0 { -0.0 } else { p.z });
         assert_eq!(held(&unique_triangle_tree(&own, opaque, BuildPreset::Default)), expected);
@@ -698,8 +705,10 @@ mod tests {
 
     /// Numbers of the triangles that a tree holds, with their flags.
     fn held(tree: &WideBvh) -> Vec<u32> {
-        let leaves = tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, TriangleLeaf>(b));
-        let mut held: Vec<u32> = leaves.flat_map(|l: TriangleLeaf| l.primitives).filter(|id| *id != pairs::NONE).collect();
+        let leaves =
+            tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, TriangleLeaf>(b));
+        let mut held: Vec<u32> =
+            leaves.flat_map(|l: TriangleLeaf| l.primitives).filter(|id| *id != pairs::NONE).collect();
         held.sort_unstable_by_key(|id| id & !ALPHA_TESTED);
         held
     }
@@ -709,9 +718,12 @@ mod tests {
     fn the_same_instance_and_sphere_is_held_once() {
         use crate::scene::{Instance, Sphere};
         let mut scene = builtin::by_name("cornell-box").unwrap();
-        let one =
-            Instance { object_to_world: glam::DAffine3::from_scale(glam::DVec3::splat(1.5)), ..scene.instances[0].clone() };
-        let moved = |x: f64| Instance { object_to_world: glam::DAffine3::from_translation(glam::DVec3::X * x), ..one.clone() };
+        let one = Instance {
+            object_to_world: glam::DAffine3::from_scale(glam::DVec3::splat(1.5)),
+            ..scene.instances[0].clone()
+        };
+        let moved =
+            |x: f64| Instance { object_to_world: glam::DAffine3::from_translation(glam::DVec3::X * x), ..one.clone() };
         scene.instances = [vec![moved(1.0)], vec![one.clone(); 500], vec![moved(2.0)], vec![moved(1.0)]].concat();
         let trees = Trees::build(&FlatScene::new(&scene), &BuildOptions::default());
         let top = trees.top.unwrap();
@@ -720,11 +732,13 @@ mod tests {
         held.sort_unstable();
         assert_eq!(held, [0, 1, 501]);
         let sphere = |x: f32| Sphere { center: Vec3::X * x, radius: 1.0 };
-        scene.meshes[0].geometry = Geometry::Spheres([vec![sphere(3.0)], vec![sphere(0.0); 700], vec![sphere(-0.0)]].concat());
+        scene.meshes[0].geometry =
+            Geometry::Spheres([vec![sphere(3.0)], vec![sphere(0.0); 700], vec![sphere(-0.0)]].concat());
         scene.instances.truncate(1);
         let flat = FlatScene::new(&scene);
         let tree = sphere_tree(&flat, &flat.groups[0], &BuildOptions::default());
-        let leaves = tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, SphereLeaf>(b));
+        let leaves =
+            tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, SphereLeaf>(b));
         let mut held: Vec<u32> = leaves.map(|l| l.primitives[0] & !SPHERE).collect();
         held.sort_unstable();
         assert_eq!(held, [0, 1]);

@@ -30,8 +30,10 @@ pub enum Change {
 /// # Errors
 /// [`Error::Usage`], with the line to add to the manifest.
 pub fn check_driver(manifest: &Manifest, info: &DeviceInfo) -> Result<()> {
-    let remedy =
-        format!("add it to [drivers] pinned in {}, or use --force", manifest.folder.join(super::manifest::NAME).display());
+    let remedy = format!(
+        "add it to [drivers] pinned in {}, or use --force",
+        manifest.folder.join(super::manifest::NAME).display()
+    );
     let refuse = |why: String| Err(Error::Usage(format!("golden images are not made on {why}: {remedy}")));
     // a driver without a version cannot be told from the next one
     if !info.driver.contains(|c: char| c.is_ascii_digit()) {
@@ -70,10 +72,12 @@ pub fn render(
         return Golden::of_image(&path, frame, session.render(frame, kind, None, None, control)?, &origin);
     };
     let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
-    let images = seeds.map(|seed| session.render(frame, kind, Some(seed), None, control)).collect::<Result<Vec<_>>>()?;
+    let images =
+        seeds.map(|seed| session.render(frame, kind, Some(seed), None, control)).collect::<Result<Vec<_>>>()?;
     let golden = Golden::of_replicates(&path, frame, &images, &origin)?;
     if let (Some(bias), Some(reference)) = (limit.bias, &golden.reference) {
-        let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::from_image(&images[0])?, reference)?;
+        let verdict =
+            ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::from_image(&images[0])?, reference)?;
         let found = verdict.detectable_bias;
         if found > bias {
             let [found, bias] = [found, bias].map(|b| 100.0 * b);

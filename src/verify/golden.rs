@@ -115,9 +115,11 @@ impl Golden {
     pub fn save(&self) -> Result<()> {
         match output::ImageFormat::from_path(&self.path)? {
             // what it is read for, and nothing for other programs
-            output::ImageFormat::Exr => {
-                output::exr::write_with(&self.image, &self.path, &ExrOptions { grey_as_rgb: false, ..Default::default() })
-            }
+            output::ImageFormat::Exr => output::exr::write_with(
+                &self.image,
+                &self.path,
+                &ExrOptions { grey_as_rgb: false, ..Default::default() },
+            ),
             _ => png_text::write(&self.image, &self.path),
         }
     }
@@ -138,8 +140,9 @@ impl Golden {
     /// # Errors
     /// [`Error::Input`] for metadata that do not make sense.
     pub fn freeze(&self, settings: &mut RenderSettings, has_camera: bool) -> Result<()> {
-        let broken =
-            |what: &str| Error::input(&self.path, format!("its metadata {what} cannot be read: make it again with --bless"));
+        let broken = |what: &str| {
+            Error::input(&self.path, format!("its metadata {what} cannot be read: make it again with --bless"))
+        };
         let named = match self.chosen() {
             Some(words) => RenderSettings::from_words(words).map_err(|_| broken(CHOSEN))?,
             None => RenderSettings::default(),
@@ -176,7 +179,9 @@ impl Golden {
         for (key, now) in expected {
             match self.image.metadata(key) {
                 Some(then) if then == now => {}
-                Some(then) => return Some(format!("its golden image was made of {then:?}, and the manifest says {now:?}")),
+                Some(then) => {
+                    return Some(format!("its golden image was made of {then:?}, and the manifest says {now:?}"));
+                }
                 None => return Some(format!("its golden image does not say how it was made (no {key})")),
             }
         }
@@ -272,7 +277,8 @@ fn read_reference(image: &Image) -> std::result::Result<Option<Reference>, Strin
     let wrong = |what: &str| format!("{what}: not a golden image of this version; make it again with --bless");
     let replicates: u32 = replicates.parse().map_err(|_| wrong("verify.replicates is no number"))?;
     let estimate = Estimate::from_image(image).map_err(|_| wrong("it has no variances"))?;
-    let whole: Vec<f64> = image.metadata(key::WHOLE).unwrap_or_default().split(',').filter_map(|v| v.parse().ok()).collect();
+    let whole: Vec<f64> =
+        image.metadata(key::WHOLE).unwrap_or_default().split(',').filter_map(|v| v.parse().ok()).collect();
     let planes: Option<Vec<&[f32]>> =
         channels_with_variance(image).iter().map(|(name, _)| image.f32(&format!("{TILE_PREFIX}{name}"))).collect();
     let planes = planes.ok_or_else(|| wrong("it has no variances of tiles"))?;

@@ -43,11 +43,16 @@ pub fn write(summary: &Summary, frames: &[Frame], folder: &Path, command: &str, 
             (0, failed) => format!("{all}: none differs from its golden image; {failed} could not be judged."),
             (differ, 0) => format!("{all}: {} from golden images.", plural(differ, "differs", "differ")),
             (differ, failed) => {
-                format!("{all}: {} from golden images; {failed} could not be judged.", plural(differ, "differs", "differ"))
+                format!(
+                    "{all}: {} from golden images; {failed} could not be judged.",
+                    plural(differ, "differs", "differ")
+                )
             }
         },
         command: command.to_owned(),
-        facts: [("Device", &summary.device), ("Driver", &summary.driver)].map(|(k, v)| (k.to_owned(), v.clone())).to_vec(),
+        facts: [("Device", &summary.device), ("Driver", &summary.driver)]
+            .map(|(k, v)| (k.to_owned(), v.clone()))
+            .to_vec(),
         sections,
         ..Page::default()
     };
@@ -84,7 +89,8 @@ fn difference(result: &FrameResult, frame: Option<&Frame>, text: &str) -> Result
     let made = golden.driver().map(|d| format!("made on {d}")).unwrap_or_default();
     let section = match compare(&image, &golden.image, &CompareOptions::default()) {
         Ok(comparison) => {
-            let now = NamedImage { name: "image", description: "rendered now", image: &image, comparison: Some(&comparison) };
+            let now =
+                NamedImage { name: "image", description: "rendered now", image: &image, comparison: Some(&comparison) };
             let then = NamedImage { name: "golden", description: &made, image: &golden.image, comparison: None };
             section(&title, &[now, then], 1)?
         }

@@ -86,8 +86,14 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     }
     let (shown, expected) = (Shown::from_image(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
     if shown.channels != expected.channels {
-        let text = format!("the image has {} channels of colour, the golden image {}", shown.channels, expected.channels);
-        checks.push(Check::new("channels", false, text, json!({ "image": shown.channels, "golden": expected.channels })));
+        let text =
+            format!("the image has {} channels of colour, the golden image {}", shown.channels, expected.channels);
+        checks.push(Check::new(
+            "channels",
+            false,
+            text,
+            json!({ "image": shown.channels, "golden": expected.channels }),
+        ));
         return Ok(Judgement { checks });
     }
 
@@ -150,7 +156,9 @@ fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
                 return Ok(Check::new("exact", false, text, json!({ "channel": expected.name })));
             };
             let differs = |p: usize| match (&channel.samples, &expected.samples) {
-                (Samples::F32(a), Samples::F32(b)) => a[p].to_bits() != b[p].to_bits() && !(a[p].is_nan() && b[p].is_nan()),
+                (Samples::F32(a), Samples::F32(b)) => {
+                    a[p].to_bits() != b[p].to_bits() && !(a[p].is_nan() && b[p].is_nan())
+                }
                 (Samples::U32(a), Samples::U32(b)) => a[p] != b[p],
                 _ => true,
             };
@@ -174,8 +182,11 @@ fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
         return Ok(Check::new("exact", true, "bit for bit", values));
     }
     let channel = if worst.is_empty() { String::new() } else { format!(" ({worst})") };
-    let mut text =
-        format!("{pixels} of {} pixels are not the same, by up to {}{channel}", differing.len(), format_number(largest));
+    let mut text = format!(
+        "{pixels} of {} pixels are not the same, by up to {}{channel}",
+        differing.len(),
+        format_number(largest)
+    );
     if let Some(driver) = golden.driver() {
         text += &format!("; the golden image was made on {driver}");
     }
@@ -217,7 +228,12 @@ fn looks(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
     let (percentile, max) = (limit.percentile, limit.max);
     let holds = found <= max;
     let text = format!("FLIP {found:.4} at the {percentile}th percentile, at most {max}");
-    Ok(Check::new("flip", holds, text, json!({ "percentile": percentile, "value": found, "max": max, "mean": flip.mean })))
+    Ok(Check::new(
+        "flip",
+        holds,
+        text,
+        json!({ "percentile": percentile, "value": found, "max": max, "mean": flip.mean }),
+    ))
 }
 
 fn noise(limit: &ZTestLimit, holds: bool, verdict: &ZTestVerdict) -> Check {

@@ -194,7 +194,8 @@ impl Manifest {
     /// As [`Manifest::load`], and for a manifest that lies elsewhere.
     pub fn load_with(folder: &Path, confine: bool) -> Result<Self> {
         let path = folder.join(NAME);
-        let confine = if confine { Some(std::fs::canonicalize(folder).map_err(|e| Error::read(folder, &e))?) } else { None };
+        let confine =
+            if confine { Some(std::fs::canonicalize(folder).map_err(|e| Error::read(folder, &e))?) } else { None };
         if let Some(confine) = &confine {
             confine::check(confine, &path, &path)?;
         }
@@ -215,7 +216,10 @@ impl Manifest {
         let defaults = &file.defaults;
         let mut frames: Vec<Frame> = file.frame.iter().map(|entry| frame(&source, folder, defaults, entry)).collect();
         if frames.is_empty() {
-            return Err(Error::input(&path, "it has no frames: add a [[frame]] with name, scene, render and tolerance"));
+            return Err(Error::input(
+                &path,
+                "it has no frames: add a [[frame]] with name, scene, render and tolerance",
+            ));
         }
         let mut names = BTreeSet::new();
         for (frame, entry) in frames.iter_mut().zip(&file.frame) {
@@ -331,7 +335,9 @@ impl Frame {
 /// and not `llvmpipe Mesa 25.01`.
 pub fn names_driver(beginnings: &[String], driver: &str) -> bool {
     let names = |beginning: &String| {
-        driver.strip_prefix(beginning.as_str()).is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric()))
+        driver
+            .strip_prefix(beginning.as_str())
+            .is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric()))
     };
     beginnings.iter().any(names)
 }
@@ -381,7 +387,8 @@ fn complete(
         frame.tracers = parse_tracers(names.get_ref()).map_err(|e| source.error(names.span(), e))?;
     }
     if entry.tolerance.or(defaults.tolerance).is_none() {
-        let message = format!("{name} has no tolerance: add one, such as tolerance = \"z_test\", to it or to [defaults]");
+        let message =
+            format!("{name} has no tolerance: add one, such as tolerance = \"z_test\", to it or to [defaults]");
         return Err(source.error(span, message));
     }
     check(frame).map_err(|message| source.error(span, format!("{name}: {message}")))

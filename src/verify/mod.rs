@@ -153,7 +153,10 @@ impl Summary {
         }
         let (failed, names) = frames(|o| matches!(o, Outcome::Failed(_)));
         if failed > 0 {
-            return Err(Error::NotVerified(format!("{} could not be judged: {names}", plural(failed, "frame", "frames"))));
+            return Err(Error::NotVerified(format!(
+                "{} could not be judged: {names}",
+                plural(failed, "frame", "frames")
+            )));
         }
         if !self.frames.is_empty() && self.count(|o| matches!(o, Outcome::Skipped(_))) == self.frames.len() {
             return Err(Error::NotVerified("no frame is for this device: nothing was compared".into()));
@@ -167,7 +170,12 @@ impl Summary {
 /// # Errors
 /// [`Error::Usage`] for no frames, or a driver that makes no golden images; errors of the device;
 /// interruption. Other errors with one frame are its outcome.
-pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
+pub fn run(
+    manifest: &Manifest,
+    options: &Options,
+    device: &DeviceSettings,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
     let start = Instant::now();
     let frames = options.selection.frames(manifest)?;
 

@@ -40,10 +40,14 @@ impl Selection {
     /// # Errors
     /// [`Error::Usage`] if filters leave none: a check of nothing would always hold.
     pub fn frames<'m>(&self, manifest: &'m Manifest) -> Result<Vec<&'m Frame>> {
-        let is_named = |f: &&Frame| self.filters.is_empty() || self.filters.iter().any(|part| f.name.contains(part.as_str()));
+        let is_named =
+            |f: &&Frame| self.filters.is_empty() || self.filters.iter().any(|part| f.name.contains(part.as_str()));
         let mut frames: Vec<&Frame> = manifest.frames.iter().filter(is_named).collect();
         if frames.is_empty() {
-            return Err(Error::Usage(format!("--filter {}: no frame has such a name", self.filters.join(" --filter "))));
+            return Err(Error::Usage(format!(
+                "--filter {}: no frame has such a name",
+                self.filters.join(" --filter ")
+            )));
         }
         let mut first: BTreeMap<&str, usize> = BTreeMap::new();
         for (k, frame) in manifest.frames.iter().enumerate() {

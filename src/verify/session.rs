@@ -92,7 +92,10 @@ impl<'m> Session<'m> {
             before => {
                 let scene = match before {
                     Some(open) if open.scene == frame.scene => open.renderer.into_scene(),
-                    _ => load::load_with(&self.manifest.scene(frame), &LoadOptions { confine, ..LoadOptions::default() })?,
+                    _ => load::load_with(
+                        &self.manifest.scene(frame),
+                        &LoadOptions { confine, ..LoadOptions::default() },
+                    )?,
                 };
                 let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
                 // the manifest's name: a golden image is the same whichever folder it was made in

@@ -14,7 +14,9 @@ use super::dialog::{Dialog, RenderedMotion};
 use super::file_kind::FileKind;
 use super::layer::Layer;
 use super::options::{CPU_FRAME_RATE, ViewOptions};
-use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
+use super::request::{
+    Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task,
+};
 use super::rounding::round_length;
 use super::technique::Technique;
 use crate::error::{Error, Result};
@@ -313,7 +315,8 @@ impl App {
         let by_index = name.parse::<usize>().ok().filter(|k| *k < animations.len());
         match by_index.or_else(|| animations.iter().position(|a| a.0 == name)) {
             Some(k) => {
-                self.playback = Playback { animation: Some(k), runs: false, time: time.min(animations[k].1), ..self.playback }
+                self.playback =
+                    Playback { animation: Some(k), runs: false, time: time.min(animations[k].1), ..self.playback }
             }
             None => self.report(format!("--animate {name}: the scene has no such animation"), true),
         }
@@ -435,7 +438,8 @@ impl App {
     /// Samples of each pixel of the first image, if it is one of what was requested last; otherwise
     /// 0.
     pub fn shown_samples(&self) -> u32 {
-        let progress = self.panes[0].progress.as_ref().filter(|p| self.loading.is_none() && p.request >= self.sent_number);
+        let progress =
+            self.panes[0].progress.as_ref().filter(|p| self.loading.is_none() && p.request >= self.sent_number);
         progress.map_or(0, |p| p.step.samples)
     }
 
@@ -747,7 +751,8 @@ impl App {
         let is_another_image = is_another_view || first(&request) != first(&before);
         let compared = |r: &Request| r.panes.last().filter(|_| r.compares).cloned();
         let is_another_comparison = is_another_image || compared(&request) != compared(&before);
-        let is_measured_anew = (request.load, request.size, &request.device) != (before.load, before.size, &before.device)
+        let is_measured_anew = (request.load, request.size, &request.device)
+            != (before.load, before.size, &before.device)
             || self.techniques[0].0 != self.first.label();
         if is_another_comparison {
             self.comparison = None;
@@ -930,7 +935,8 @@ impl App {
         match motion {
             RenderedMotion::Nothing => {}
             RenderedMotion::Turntable => {
-                (frames.orbit, frames.frames) = (Some(TURNTABLE_FRAMES), Some(FrameRange { first: 0, end: TURNTABLE_FRAMES }));
+                (frames.orbit, frames.frames) =
+                    (Some(TURNTABLE_FRAMES), Some(FrameRange { first: 0, end: TURNTABLE_FRAMES }));
             }
             RenderedMotion::Animation => {
                 let animation = self.playback.animation.and_then(|k| Some((k, scene.animations.get(k)?.1)));

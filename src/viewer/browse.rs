@@ -20,7 +20,9 @@ impl Browsing {
             Dialog::Open(_) => {
                 ("Open a scene", &[("Scenes", &["gltf", "glb", "obj", "brhan"]), ("Environments", &["hdr", "exr"])])
             }
-            Dialog::Save(_) => ("Save the image", &[("Image as shown", &["png", "jpg", "webp"]), ("All channels", &["exr"])]),
+            Dialog::Save(_) => {
+                ("Save the image", &[("Image as shown", &["png", "jpg", "webp"]), ("All channels", &["exr"])])
+            }
             Dialog::LoadSettings(_) => ("Load settings", &[("Settings", &["json"])]),
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),
             Dialog::Render(..) => ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng"])]),

@@ -47,7 +47,13 @@ pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
 
 /// Frames are made as a window makes them: when there is input, when the renderer has news, and
 /// when the user interface asks for one.
-fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32; 2], woken: &AtomicBool) -> Result<()> {
+fn drive(
+    context: &egui::Context,
+    app: &mut App,
+    script: &mut Script,
+    size: [u32; 2],
+    woken: &AtomicBool,
+) -> Result<()> {
     // in pixels; and the display's scale
     let (mut size, mut scale, start) = (size, 1.0, Instant::now());
     let mut redraw = Some(start);
@@ -58,7 +64,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         // the size of the window in points, which are larger when the text is
         let pixels_per_point = scale * context.zoom_factor();
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / pixels_per_point);
-        let mut input = RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
+        let mut input =
+            RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
         input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
 
         // without anything to do the loop sleeps, as a window does
@@ -78,7 +85,13 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         script.observe(&output, app);
         let pixels = size.map(|n| n as usize);
         words.resize(pixels[0] * pixels[1], 0);
-        painter.paint(&mut FrameBuffer { size: pixels, words: &mut words }, BACKGROUND, app.layers(), context, &mut painted);
+        painter.paint(
+            &mut FrameBuffer { size: pixels, words: &mut words },
+            BACKGROUND,
+            app.layers(),
+            context,
+            &mut painted,
+        );
         script.observe_time(frame_start.elapsed());
 
         // requests of the script

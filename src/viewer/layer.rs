@@ -37,8 +37,9 @@ impl Layer {
         }
 
         // the part of the frame that shows the image
-        let clip =
-            |at: i32, k: usize, most: usize| (at.max(self.area[k % 2]).min(self.area[k % 2 + 2]).max(0) as usize).min(most);
+        let clip = |at: i32, k: usize, most: usize| {
+            (at.max(self.area[k % 2]).min(self.area[k % 2 + 2]).max(0) as usize).min(most)
+        };
         let [x0, x1] = [self.clip[0], self.clip[2]].map(|x| clip(x, 0, to.size[0]));
         let [y0, y1] = [self.clip[1], self.clip[3]].map(|y| clip(y, 1, to.size[1]));
         let source: &[u8] = &self.picture.rgba;
@@ -95,7 +96,8 @@ mod tests {
 
     #[test]
     fn equal_sizes_are_copied_within_the_clip() {
-        let layer = Layer { picture: picture([4, 3], |x, y| (10 * y + x) as u8), area: [1, 1, 5, 4], clip: [2, 0, 9, 3] };
+        let layer =
+            Layer { picture: picture([4, 3], |x, y| (10 * y + x) as u8), area: [1, 1, 5, 4], clip: [2, 0, 9, 3] };
         let words = drawn(&layer, [6, 5]);
         for y in 0..5 {
             for x in 0..6 {
@@ -114,7 +116,9 @@ mod tests {
         let reds: Vec<u32> = drawn(&ramp, [8, 1]).iter().map(|w| w >> 16).collect();
         assert_eq!(reds, [0, 0, 13, 38, 63, 88, 100, 100]);
         // beyond the frame buffer, turned over, empty
-        for (area, clip) in [([-5, -5, 90, 90], [-9, -9, 99, 99]), ([5, 5, 1, 1], [0, 0, 8, 8]), ([0, 0, 8, 8], [7, 7, 2, 2])] {
+        for (area, clip) in
+            [([-5, -5, 90, 90], [-9, -9, 99, 99]), ([5, 5, 1, 1], [0, 0, 8, 8]), ([0, 0, 8, 8], [7, 7, 2, 2])]
+        {
             drawn(&Layer { picture: picture([2, 2], |_, _| 1), area, clip }, [8, 8]);
         }
         drawn(&Layer { picture: Arc::default(), area: [0, 0, 8, 8], clip: [0, 0, 8, 8] }, [8, 8]);

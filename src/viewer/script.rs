@@ -28,7 +28,10 @@ pub const COMMANDS: &[(&str, &str)] = &[
         "wait picture|settled [SECONDS]",
         "until the first image has a picture, or all have settled; at most so long [120]; fails at once where a scene or an image cannot be had",
     ),
-    ("wait samples N [SECONDS]", "until the first image has N samples of each pixel, or has settled; at most so long [120]"),
+    (
+        "wait samples N [SECONDS]",
+        "until the first image has N samples of each pixel, or has settled; at most so long [120]",
+    ),
     ("wait compared [SECONDS]", "until there is a comparison with the truth"),
     ("wait text:TEXT", "until a control or label contains the text; at most 120 seconds"),
     ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
@@ -200,8 +203,10 @@ impl Measured {
 /// Resident memory of the process in MiB; 0 where the system does not say.
 fn resident_mib() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kib =
-        status.lines().find_map(|l| l.strip_prefix("VmRSS:")).and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
+    let kib = status
+        .lines()
+        .find_map(|l| l.strip_prefix("VmRSS:"))
+        .and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
     kib.unwrap_or(0.0) / 1024.0
 }
 
@@ -221,7 +226,8 @@ impl Script {
             if line.is_empty() || line.starts_with('#') {
                 continue;
             }
-            let command = parse(line).ok_or_else(|| Error::input(path, format!("line {}: not a command: {line}", k + 1)))?;
+            let command =
+                parse(line).ok_or_else(|| Error::input(path, format!("line {}: not a command: {line}", k + 1)))?;
             commands.push_back((k + 1, command));
         }
         Ok(Self {
@@ -263,8 +269,9 @@ impl Script {
             }
         }
         self.messages_seen = app.messages.len();
-        self.errors
-            .extend(app.panes.iter().filter_map(|p| p.error.clone()).filter(|e| !self.errors.contains(e)).collect::<Vec<_>>());
+        self.errors.extend(
+            app.panes.iter().filter_map(|p| p.error.clone()).filter(|e| !self.errors.contains(e)).collect::<Vec<_>>(),
+        );
     }
 
     /// Notes how long a frame of the user interface took, painting included.
@@ -347,8 +354,13 @@ impl Script {
 
             // keys and text
             Command::Key(modifiers, key, time) => {
-                let event =
-                    |pressed| Event::Key { key: *key, physical_key: None, pressed, repeat: false, modifiers: *modifiers };
+                let event = |pressed| Event::Key {
+                    key: *key,
+                    physical_key: None,
+                    pressed,
+                    repeat: false,
+                    modifiers: *modifiers,
+                };
                 input.modifiers = *modifiers;
                 if step == 0 {
                     input.events.push(event(true));
@@ -457,7 +469,9 @@ impl Script {
                 self.known_failures = app.load_failures.len();
                 Ok(true)
             }
-            Command::Expect(text) => Err(format!("nothing on the screen contains \"{text}\"{}", self.shown_errors(app))),
+            Command::Expect(text) => {
+                Err(format!("nothing on the screen contains \"{text}\"{}", self.shown_errors(app)))
+            }
             Command::ExpectNoErrors => match self.errors.first() {
                 None => Ok(true),
                 Some(error) => Err(format!("an error was shown: {error}")),
@@ -679,10 +693,18 @@ mod tests {
         assert_eq!(read("wait 0.5"), Some(Command::Wait(Duration::from_millis(500))));
         assert_eq!(read("wait samples 32"), Some(Command::WaitFor(Condition::Samples(32), PATIENCE)));
         assert_eq!(read("wait samples 8 7"), Some(Command::WaitFor(Condition::Samples(8), Duration::from_secs(7))));
-        assert!(read("wait samples").is_none() && read("wait samples 0").is_none() && read("wait samples many").is_none());
+        assert!(
+            read("wait samples").is_none() && read("wait samples 0").is_none() && read("wait samples many").is_none()
+        );
         assert_eq!(read("wait settled 7"), Some(Command::WaitFor(Condition::Settled, Duration::from_secs(7))));
-        assert_eq!(read("wait text:Open a scene"), Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE)));
-        assert_eq!(read("key Ctrl+S"), Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO)));
+        assert_eq!(
+            read("wait text:Open a scene"),
+            Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE))
+        );
+        assert_eq!(
+            read("key Ctrl+S"),
+            Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO))
+        );
         assert_eq!(read("set AO radius = 0.5"), Some(Command::Set("AO radius".into(), 0.5)));
         let drag = Command::Drag(
             Pos2::new(1.0, 2.0),

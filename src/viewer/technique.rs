@@ -37,7 +37,8 @@ impl Technique {
         let stills = || integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name())).map(Self::Still);
         let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Result);
         let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
-        let converging = [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (2, t));
+        let converging =
+            [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (2, t));
         let light = stills().filter(|t| t.has_frames()).filter_map(|t| match t {
             Self::Still(integrator) => Some((1, Self::Frames(integrator))),
             _ => None,
@@ -55,7 +56,9 @@ impl Technique {
             Self::Gtao => "GTAO (screen space)".into(),
             Self::Frames(integrator) => format!("{}, real time", word(integrator.name())),
             Self::Still(integrator) if integrator.can(Capability::AmbientVisibility) => "AO still".into(),
-            Self::Still(integrator) if integrator.can(Capability::WhiteSky) => format!("AO truth ({})", integrator.name()),
+            Self::Still(integrator) if integrator.can(Capability::WhiteSky) => {
+                format!("AO truth ({})", integrator.name())
+            }
             // of views that are no colours there are buffers, too
             Self::Still(integrator) if self.is_view_of_surfaces() && !integrator.can(Capability::ToneMapping) => {
                 format!("{}, antialiased", word(integrator.name()))
@@ -181,7 +184,8 @@ impl Technique {
             },
             Self::Frames(integrator) => {
                 settings.integrator = Some(integrator);
-                let preset = own.preset.filter(|p| !matches!(p, Preset::Larsen | Preset::Reference)).unwrap_or_default();
+                let preset =
+                    own.preset.filter(|p| !matches!(p, Preset::Larsen | Preset::Reference)).unwrap_or_default();
                 FrameSettings { preset: Some(preset), technique: None, primary: None, ..own }
             }
             Self::Still(integrator) => {

@@ -50,7 +50,13 @@ fn expected_aov(scene: &Scene, oracle: &Oracle, camera: &Camera, size: [u32; 2],
     let hit = oracle.closest(ray);
     if !hit.is_hit() {
         let none = u32::MAX;
-        return AovPixel { depth: f32::INFINITY, instance: none, primitive: none, material: none, ..AovPixel::zeroed() };
+        return AovPixel {
+            depth: f32::INFINITY,
+            instance: none,
+            primitive: none,
+            material: none,
+            ..AovPixel::zeroed()
+        };
     }
     let instance = &scene.instances[hit.instance as usize];
     let mesh = &scene.meshes[instance.mesh];
@@ -64,7 +70,8 @@ fn expected_aov(scene: &Scene, oracle: &Oracle, camera: &Camera, size: [u32; 2],
             let corners = t.indices[hit.primitive as usize].map(|i| i as usize);
             let [a, b, c] = corners.map(|i| t.positions[i].as_dvec3());
             let ng = (normals * (b - a).cross(c - a)).normalize();
-            let blend = |f: &dyn Fn(usize) -> DVec4| f(corners[0]) * (1.0 - v - w) + f(corners[1]) * v + f(corners[2]) * w;
+            let blend =
+                |f: &dyn Fn(usize) -> DVec4| f(corners[0]) * (1.0 - v - w) + f(corners[1]) * v + f(corners[2]) * w;
             let ns = match t.normals.is_empty() {
                 true => ng,
                 false => (normals * blend(&|i| t.normals[i].as_dvec3().extend(0.0)).truncate()).normalize(),
@@ -204,7 +211,12 @@ fn gpu_auxiliary_outputs_equal_the_oracles() {
                 );
                 // edges within rounding of a pixel's centre, grazing views, borders of texels
                 for k in 0..6 {
-                    assert!(off[k] <= want.len() / 1000, "{what}: output {k} differs at {} pixels: {:?}", off[k], example[k]);
+                    assert!(
+                        off[k] <= want.len() / 1000,
+                        "{what}: output {k} differs at {} pixels: {:?}",
+                        off[k],
+                        example[k]
+                    );
                 }
             }
         }

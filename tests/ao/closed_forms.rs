@@ -41,7 +41,10 @@ fn check(device: &Arc<Device>, case: &Case) {
         );
         assert_eq!(uncovered, 0, "{what}: pixels see past the surface");
         assert!(standard_error <= PRECISION, "{what}: standard error {standard_error}");
-        assert!(bias.abs() <= (3.0 * independent_error).min(5e-4), "{what}: bias {bias}, standard error {independent_error}");
+        assert!(
+            bias.abs() <= (3.0 * independent_error).min(5e-4),
+            "{what}: bias {bias}, standard error {independent_error}"
+        );
         // the last term: single precision's own share
         assert!(bias.abs() <= 4.5 * standard_error + 2e-6, "{what}: bias {bias}, true standard error {standard_error}");
     }
@@ -293,7 +296,8 @@ fn gpu_ao_parallel_planes() {
     // wider than any ray reaches
     let gap = 0.5;
     let scene = analytic::parallel_planes(40.0, 40.0, gap, SceneTransform::default());
-    for (c, radius) in [(2.0, f64::INFINITY), (8.0, f64::INFINITY), (32.0, f64::INFINITY), (8.0, 1.0), (1.0, 0.8), (1.0, 0.49)]
+    for (c, radius) in
+        [(2.0, f64::INFINITY), (8.0, f64::INFINITY), (32.0, f64::INFINITY), (8.0, 1.0), (1.0, 0.8), (1.0, 0.49)]
     {
         let want = exact::parallel_disk(gap, f64::INFINITY, c, reach(c).min(radius));
         let case = Case {
@@ -335,7 +339,14 @@ fn gpu_ao_faint_occlusion_counts() {
 }
 
 /// Every sample of an image has the value `want`, exactly; `spare` samples of a million may not.
-fn check_exact(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera, want: f32, spare: impl Fn(TracerKind) -> f64) {
+fn check_exact(
+    device: &Arc<Device>,
+    what: &str,
+    scene: &Scene,
+    camera: &Camera,
+    want: f32,
+    spare: impl Fn(TracerKind) -> f64,
+) {
     let options = options(96, 16, 1.0, f64::INFINITY);
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
@@ -344,7 +355,8 @@ fn check_exact(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera,
         let (covered, off) = closed_forms::samples_off(&image.image.film, image.image.spp, want);
         println!("{what} {kind}: {off} of {covered} samples are not {want}");
         assert!(
-            covered >= 0.25 * options.samples.size[0] as f64 * options.samples.size[1] as f64 * options.samples.spp as f64,
+            covered
+                >= 0.25 * options.samples.size[0] as f64 * options.samples.size[1] as f64 * options.samples.spp as f64,
             "{what} {kind}: {covered} covered"
         );
         assert!(off <= spare(kind) * 1e-6 * covered, "{what} {kind}: {off} of {covered} samples are not {want}");
@@ -366,16 +378,17 @@ fn gpu_ao_plane_is_one() {
         }
         // turned by its instance's transform, which is baked into the vertices, or, with a second instance out of sight, is not
         let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -0.4, 1.1);
-        let about =
-            DAffine3::from_translation(place.offset) * DAffine3::from_quat(turn) * DAffine3::from_translation(-place.offset);
+        let about = DAffine3::from_translation(place.offset)
+            * DAffine3::from_quat(turn)
+            * DAffine3::from_translation(-place.offset);
         let mut tilted = scene.clone();
         tilted.instances[0].object_to_world = about * tilted.instances[0].object_to_world;
         tilted.cameras[0].camera_to_world = about * tilted.cameras[0].camera_to_world;
         check_exact(&device, &format!("{what}, tilted"), &tilted, &tilted.cameras[0], 1.0, |_| 0.0);
         let mut two = tilted.clone();
         let mut second = two.instances[0].clone();
-        second.object_to_world =
-            DAffine3::from_translation(about.transform_vector3(DVec3::Y) * (-20.0 * place.scale)) * second.object_to_world;
+        second.object_to_world = DAffine3::from_translation(about.transform_vector3(DVec3::Y) * (-20.0 * place.scale))
+            * second.object_to_world;
         two.instances.push(second);
         check_exact(&device, &format!("{what}, tilted, instanced"), &two, &two.cameras[0], 1.0, |_| 0.0);
     }
@@ -440,7 +453,8 @@ fn gpu_ao_uneven_plane_is_one() {
                 let target = place([0.0, 0.0]);
                 let eye = target + (up * distance + along) * size;
                 let camera = Camera::look_at(eye, target, DVec3::X, fov);
-                let mesh = TriangleMesh { positions: positions.clone(), indices: indices.clone(), ..Default::default() };
+                let mesh =
+                    TriangleMesh { positions: positions.clone(), indices: indices.clone(), ..Default::default() };
                 let scene = mesh_scene(mesh, camera);
                 let what = format!("uneven plane, {name}, size {size}, offset {offset}, view {k}");
                 check_exact(&device, &what, &scene, &scene.cameras[0], 1.0, |_| 0.0);
@@ -467,7 +481,14 @@ fn gpu_ao_closed_box_is_zero() {
         let mut ball = scene.clone();
         // around the camera too
         ball.meshes[0].geometry = shapes::icosphere(1.5, 3);
-        check_exact(&device, &format!("inside of an icosphere, scale {}", place.scale), &ball, &ball.cameras[0], 0.0, spare);
+        check_exact(
+            &device,
+            &format!("inside of an icosphere, scale {}", place.scale),
+            &ball,
+            &ball.cameras[0],
+            0.0,
+            spare,
+        );
     }
     assert_validation_clean(&device);
 }

@@ -30,10 +30,18 @@ fn gpu_film_sums_are_compensated() {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, &camera, &options);
         let (_, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, 0.0);
-        let relative: Vec<f64> =
-            image.image.film.variance.iter().zip(&want.variance).map(|(a, b)| (*a as f64 / *b as f64 - 1.0).abs()).collect();
+        let relative: Vec<f64> = image
+            .image
+            .film
+            .variance
+            .iter()
+            .zip(&want.variance)
+            .map(|(a, b)| (*a as f64 / *b as f64 - 1.0).abs())
+            .collect();
         let worst = relative.iter().fold(0.0f64, |a, b| a.max(*b));
-        println!("{kind}: means differ by at most {greatest:.1e}, on average {mean:+.1e}; variances by a share of {worst:.1e}");
+        println!(
+            "{kind}: means differ by at most {greatest:.1e}, on average {mean:+.1e}; variances by a share of {worst:.1e}"
+        );
         assert!(image.image.film.samples.iter().all(|&s| s == 20_000));
         assert!(want.variance.iter().all(|v| *v > 1e-3));
         assert!(greatest <= 4e-7, "{kind}: means differ by {greatest}");
@@ -90,15 +98,22 @@ fn gpu_film_does_not_depend_on_batches() {
         // 1 + 16 + 4 + 2
         let kept = render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.keep_rays = true));
         // 1 at a time at first, more later
-        let paced =
-            render(&tracer, &scene, camera, &options.clone().with_samples(|s| s.time_limit = Some(Duration::from_secs(3600))));
+        let paced = render(
+            &tracer,
+            &scene,
+            camera,
+            &options.clone().with_samples(|s| s.time_limit = Some(Duration::from_secs(3600))),
+        );
         for other in [&kept, &paced] {
             assert_eq!(whole.image.film.mean, other.image.film.mean, "{kind}");
             assert_eq!(whole.image.film.variance, other.image.film.variance, "{kind}");
             assert_eq!(whole.image.film.coverage, other.image.film.coverage, "{kind}");
             assert_eq!(whole.occlusion_rays, other.occlusion_rays, "{kind}");
         }
-        assert!(whole.image.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000, "{kind}: nothing to see");
+        assert!(
+            whole.image.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000,
+            "{kind}: nothing to see"
+        );
     }
     assert_validation_clean(&device);
 }
@@ -110,7 +125,10 @@ fn gpu_kernels_stop_at_the_end_of_the_queue() {
     // much background: the queue of one launch is longer than that of the next
     let scene = scene("cornell-box");
     let camera = &scene.cameras[0];
-    let far = Camera { camera_to_world: DAffine3::from_translation(DVec3::Z * 4.0) * camera.camera_to_world, ..camera.clone() };
+    let far = Camera {
+        camera_to_world: DAffine3::from_translation(DVec3::Z * 4.0) * camera.camera_to_world,
+        ..camera.clone()
+    };
     let camera =
         [camera.clone(), far].into_iter().max_by_key(|c| (c.camera_to_world.translation.z.abs() * 1e6) as i64).unwrap();
     let flat = FlatScene::new(&scene);
@@ -149,10 +167,12 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
             let camera = Camera::look_at(eye, middle + DVec3::X * reach * 0.5, DVec3::Y, 0.6);
             (name, scene, camera)
         })
-        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default()))].map(|(name, scene)| {
-            let camera = Camera::look_at(DVec3::new(40.0, 30.0, 50.0), DVec3::ZERO, DVec3::Y, 0.5);
-            (name, scene, camera)
-        }))
+        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default()))].map(
+            |(name, scene)| {
+                let camera = Camera::look_at(DVec3::new(40.0, 30.0, 50.0), DVec3::ZERO, DVec3::Y, 0.5);
+                (name, scene, camera)
+            },
+        ))
         .collect();
     for (name, scene, camera) in &cases {
         let flat = FlatScene::new(scene);
@@ -167,7 +187,8 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
             for kind in tracers(&device) {
                 let tracer = tracer(&device, kind, scene);
                 let whole = render(&tracer, scene, &camera, &options);
-                let image = render(&tracer, scene, &camera, &options.clone().with_samples(|s| s.tile_mask = tile_mask.clone()));
+                let image =
+                    render(&tracer, scene, &camera, &options.clone().with_samples(|s| s.tile_mask = tile_mask.clone()));
                 assert_eq!(whole.image.film.mean, image.image.film.mean, "{name} {kind}");
                 assert_eq!(whole.image.film.coverage, image.image.film.coverage, "{name} {kind}");
                 assert_eq!(whole.image.film.samples, image.image.film.samples, "{name} {kind}");

@@ -33,7 +33,10 @@ fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: 
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
         let image = render(&tracer, scene, camera, options);
-        assert!(image.image.film.samples.iter().all(|&s| s == options.samples.spp), "{what} {kind}: samples are missing");
+        assert!(
+            image.image.film.samples.iter().all(|&s| s == options.samples.spp),
+            "{what} {kind}: samples are missing"
+        );
         let (count, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, threshold);
         let (covers, ..) = differences(&image.image.film.coverage, &want.coverage, 1e-6);
         println!(
@@ -63,7 +66,8 @@ fn gpu_images_equal_the_oracles() {
         let options = AoOptions { samples: SampleSettings::new([96, 72], 8, 3), ..Default::default() };
         compare_with_oracle(&device, name, &scene, &scene.cameras[0], &options);
     }
-    for (name, falloff, radius) in [("stairs", 8.0, f64::INFINITY), ("leaf-cards", 2.0, 0.6), ("spheres:300", 1.0, 0.5)] {
+    for (name, falloff, radius) in [("stairs", 8.0, f64::INFINITY), ("leaf-cards", 2.0, 0.6), ("spheres:300", 1.0, 0.5)]
+    {
         let scene = scene(name);
         let options = AoOptions { samples: SampleSettings::new([96, 72], 8, 4), falloff, radius, ..Default::default() };
         let what = format!("{name}, falloff {falloff}, radius {radius}");
@@ -142,7 +146,12 @@ fn gpu_images_of_several_blocks() {
         .par_iter()
         .map(|&pixel| {
             let u = sampler.get_2d_unit(pixel, 0, CAMERA_FILM);
-            let ray = camera_ray(camera, oracle.origin(), options.samples.size, [0, 1].map(|k| pixel[k] as f64 + u[k] as f64));
+            let ray = camera_ray(
+                camera,
+                oracle.origin(),
+                options.samples.size,
+                [0, 1].map(|k| pixel[k] as f64 + u[k] as f64),
+            );
             let hit = oracle.closest(ray);
             if !hit.is_hit() {
                 return 0.0;
@@ -202,8 +211,10 @@ fn gpu_entry_points_miss_nothing() {
         let scene = scene(name);
         let mut camera = scene.cameras[0].clone();
         camera.projection = Projection::Perspective { fov_y: f64::to_radians(fov_y) };
-        let options =
-            AoOptions { samples: SampleSettings { pixel_filter, ..SampleSettings::new(size, 32, 5) }, ..Default::default() };
+        let options = AoOptions {
+            samples: SampleSettings { pixel_filter, ..SampleSettings::new(size, 32, 5) },
+            ..Default::default()
+        };
         let flat = FlatScene::new(&scene);
         let [start, root] = [Kernel::Packet, Kernel::Wide].map(|kernel| {
             let tracer = Tracer::with_options(&device, TracerKind::Compute, &flat, Needs::default(), kernel).unwrap();
@@ -214,7 +225,10 @@ fn gpu_entry_points_miss_nothing() {
         let (covers, ..) = differences(&start.image.film.coverage, &root.image.film.coverage, 0.0);
         println!("{name} {pixel_filter}: {count} pixels differ, by {greatest} at most; {covers} in coverage");
         assert!(root.occlusion_rays > 1000, "{name}: {} occlusion rays", root.occlusion_rays);
-        assert!(covers == 0 && count <= 2 && greatest < 1.5 / 32.0, "{name}: {count} pixels differ, {covers} in coverage");
+        assert!(
+            covers == 0 && count <= 2 && greatest < 1.5 / 32.0,
+            "{name}: {count} pixels differ, {covers} in coverage"
+        );
     }
     assert_validation_clean(&device);
 }

@@ -40,8 +40,14 @@ fn differences(a: &[f32], b: &[f32], threshold: f32) -> (usize, f32, f64) {
 
 /// The oracle's image as a film has it: means over all samples.
 fn oracle_image(oracle: &Oracle, camera: &Camera, options: &AoOptions) -> oracle_ao::AoImage {
-    let mut image =
-        oracle_ao::render(oracle, camera, options.samples.size, options.samples.spp, options.samples.seed, &settings(options));
+    let mut image = oracle_ao::render(
+        oracle,
+        camera,
+        options.samples.size,
+        options.samples.spp,
+        options.samples.seed,
+        &settings(options),
+    );
     for (a, c) in image.ambient_visibility.iter_mut().zip(&image.coverage) {
         *a *= c;
     }

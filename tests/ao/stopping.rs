@@ -78,8 +78,13 @@ fn gpu_interruption_and_progress() {
         // stop, but keep what there is
         let image = ao::render(&tracer, &camera, &options, &mut stopper(9, || Ok(true))).unwrap();
         println!("{kind}: stopped after {} samples", image.image.spp);
-        assert!(image.image.stopped_early && image.image.spp >= 1 && image.image.spp < 800, "{kind}: {}", image.image.spp);
-        let same = render(&tracer, &scene, &scene.cameras[0], &options.clone().with_samples(|s| s.spp = image.image.spp));
+        assert!(
+            image.image.stopped_early && image.image.spp >= 1 && image.image.spp < 800,
+            "{kind}: {}",
+            image.image.spp
+        );
+        let same =
+            render(&tracer, &scene, &scene.cameras[0], &options.clone().with_samples(|s| s.spp = image.image.spp));
         assert_eq!(image.image.film.mean, same.image.film.mean, "{kind}: not the image of as many samples");
         assert!(!same.image.stopped_early);
         // in the midst of the first samples that are taken together: one is finished, or there would be no image

@@ -69,7 +69,8 @@ fn gpu_names_that_are_not_unicode() {
     assert!(at(b"rays\xff.primary.bin").exists());
     // scenes and names of formats are text: one line says so
     for argument in [&b"sc\xffene.glb"[..], b"\xff"] {
-        let out = skylit(&["render"]).arg(OsString::from_vec(argument.to_vec())).args(["-o", "a.png"]).output().unwrap();
+        let out =
+            skylit(&["render"]).arg(OsString::from_vec(argument.to_vec())).args(["-o", "a.png"]).output().unwrap();
         assert_refusal(&out, 64, "UTF-8", &["render"]);
     }
 }
@@ -133,8 +134,10 @@ fn gpu_frames_of_a_device_that_is_lost() {
     let before: Vec<_> = names(dir.path()).iter().map(|f| std::fs::read(dir.path().join(f)).unwrap()).collect();
     names(dir.path()).iter().for_each(|f| std::fs::remove_file(dir.path().join(f)).unwrap());
     let lose = |submission: u32| {
-        let out =
-            skylit(&args).args(["-o", &png, "-o", &apng]).env("SKYLIT_FAULT_DEVICE_LOST", submission.to_string()).output();
+        let out = skylit(&args)
+            .args(["-o", &png, "-o", &apng])
+            .env("SKYLIT_FAULT_DEVICE_LOST", submission.to_string())
+            .output();
         out.unwrap()
     };
     // the submission that ends somewhere in the middle
@@ -180,11 +183,16 @@ fn gpu_the_viewer_goes_on_after_a_device_was_lost() {
     assert!(out.status.success(), "{}", stderr(&out));
     let [kept, lost] = ["kept.exr", "lost.exr"].map(|name| skylit::output::load(at(name).as_ref()).unwrap());
     for key in ["command", "camera_pose", "scene"] {
-        assert!(kept.metadata(key).is_some() && kept.metadata(key) == lost.metadata(key), "{key}: {:?}", lost.metadata(key));
+        assert!(
+            kept.metadata(key).is_some() && kept.metadata(key) == lost.metadata(key),
+            "{key}: {:?}",
+            lost.metadata(key)
+        );
     }
     assert!(lost.metadata("command").unwrap().contains("--ao-radius 0.6"), "{:?}", lost.metadata("command"));
     // one that is lost again and again is no endless loop
-    let out = view("wait text:was lost\nwait text:failed; the driver has reset it or crashed\nexpect-no-errors\n", "1+");
+    let out =
+        view("wait text:was lost\nwait text:failed; the driver has reset it or crashed\nexpect-no-errors\n", "1+");
     ends(&out, 1, "lost");
 }
 
@@ -273,8 +281,10 @@ fn host_memory_that_runs_out() {
     // what the program itself takes depends on how it was optimised; a little more is enough to start, and too little for threads
     let starts = |kib: &u64| limited(*kib, &["-V"]).status.success();
     let least: u64 = (40_000..400_000).step_by(2_000).find(starts).expect("the program starts somewhere");
-    for kib in
-        [(8_000..28_000).step_by(2_000).collect(), vec![40_000, 80_000]].concat().into_iter().map(|more: u64| least + more)
+    for kib in [(8_000..28_000).step_by(2_000).collect(), vec![40_000, 80_000]]
+        .concat()
+        .into_iter()
+        .map(|more: u64| least + more)
     {
         let out = limited(kib, &export);
         ends(&out, 5, "out of memory: the system has no ");
@@ -387,8 +397,17 @@ fn gpu_files_that_exceed_their_limit() {
         let program = skylit(&[]).get_program().to_owned();
         let mut command = Command::new("sh");
         // in blocks of 512 bytes or, with bash, of 1024
-        command.args(["-c", "ulimit -c 0; ulimit -f 8; exec \"$@\"", "sh"]).arg(program).args(args).current_dir(dir.path());
-        command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null()).output().unwrap()
+        command
+            .args(["-c", "ulimit -c 0; ulimit -f 8; exec \"$@\"", "sh"])
+            .arg(program)
+            .args(args)
+            .current_dir(dir.path());
+        command
+            .env("XDG_CONFIG_HOME", "/nonexistent")
+            .env_remove("RUST_BACKTRACE")
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
     };
     std::fs::write(dir.path().join("a.glb"), "older").unwrap();
     let remedy = "raise the limit (`ulimit -f unlimited`)";
@@ -421,7 +440,8 @@ fn gpu_folders_that_are_read_only() {
     assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
     // hierarchies that are to be kept are a warning
     let script = "mount -o remount,ro $F && $S \"$@\" --build best --bvh-cache $F/kept";
-    let arguments = ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "32x24", "--spp", "1", "-o", &file];
+    let arguments =
+        ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "32x24", "--spp", "1", "-o", &file];
     let out = with_mount("size=1m", script, &arguments).unwrap();
     assert!(out.status.success() && stderr(&out).contains("not cached"), "{}", stderr(&out));
     // neither a home nor a cache
@@ -452,7 +472,8 @@ fn gpu_signals_at_any_time() {
     }
     let dir = tempfile::tempdir().unwrap();
     let exr = place(&dir, "a.exr");
-    let still = ["render", "builtin:terrain:300000", "--size", "320x200", "--spp", "24", "--resumable", "-o", &exr, "--quiet"];
+    let still =
+        ["render", "builtin:terrain:300000", "--size", "320x200", "--spp", "24", "--resumable", "-o", &exr, "--quiet"];
     let start = Instant::now();
     assert!(run(&still).status.success());
     let whole_time = start.elapsed();
@@ -508,7 +529,8 @@ fn gpu_what_was_interrupted_goes_on() {
     let [all, part] = ["all", "part"].map(folder);
     let stills = |folder: &Path, extra: &[&str]| {
         let output = folder.join("a.#.exr").to_str().unwrap().to_owned();
-        let base = ["render", "builtin:parade", "--integrator", "direct", "--size", "64x36", "--frames", "0..6", "--animate"];
+        let base =
+            ["render", "builtin:parade", "--integrator", "direct", "--size", "64x36", "--frames", "0..6", "--animate"];
         let rest = ["--fps", "10", "--spp", "4", "--quiet", "-o", &output];
         let mut command = skylit(&[&base[..], &rest, extra].concat());
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -605,7 +627,8 @@ fn gpu_processes_side_by_side() {
     let (exr, cache, kept) = (place(&dir, "a.exr"), place(&dir, "cache"), place(&dir, "kept"));
     let seeds = ["1", "2", "3"];
     let command = |seed: &str, output: &str| {
-        let args = [&STILL[..], &["--tracer", "compute", "--build", "best", "--seed", seed, "--quiet", "-o", output]].concat();
+        let args =
+            [&STILL[..], &["--tracer", "compute", "--build", "best", "--seed", seed, "--quiet", "-o", output]].concat();
         let mut command = skylit(&args);
         command.args(["--bvh-cache", &kept]).env("XDG_CACHE_HOME", &cache);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -653,7 +676,8 @@ fn names_cannot_command_a_terminal() {
     std::fs::write(&scene, gltf.to_string()).unwrap();
     let channel = |value: f32| Channel { name: "a\u{1b}[31m\nb".into(), samples: Samples::F32(vec![value; 4]) };
     let exr = place(&dir, "evil.exr");
-    output::save(&Image { width: 2, height: 2, channels: vec![channel(0.5)], metadata: Vec::new() }, exr.as_ref()).unwrap();
+    output::save(&Image { width: 2, height: 2, channels: vec![channel(0.5)], metadata: Vec::new() }, exr.as_ref())
+        .unwrap();
     std::fs::write(dir.path().join("skylit.toml"), "\"a\\u001b[31m\\u009bb\" = 1\n").unwrap();
     for args in [
         &["info", &scene, "--no-device"][..],
@@ -666,7 +690,10 @@ fn names_cannot_command_a_terminal() {
         let text = String::from_utf8([out.stdout, out.stderr].concat()).unwrap();
         let obeyed = |c: char| c.is_control() && c != '\n' || c == '\u{202e}';
         assert!(!text.chars().any(obeyed), "{args:?}: {text:?}");
-        assert!(!text.lines().any(|line| line.starts_with("c ") || line.starts_with("b ") || line == "b"), "{args:?}: {text}");
+        assert!(
+            !text.lines().any(|line| line.starts_with("c ") || line.starts_with("b ") || line == "b"),
+            "{args:?}: {text}"
+        );
     }
 }
 
@@ -680,7 +707,8 @@ fn gpu_a_locale_with_decimal_commas() {
     let dir = tempfile::tempdir().unwrap();
     let locales = place(&dir, "locales");
     std::fs::create_dir(&locales).unwrap();
-    let made = Command::new("localedef").args(["-i", "de_DE", "-f", "UTF-8", &format!("{locales}/de_DE.UTF-8")]).output();
+    let made =
+        Command::new("localedef").args(["-i", "de_DE", "-f", "UTF-8", &format!("{locales}/de_DE.UTF-8")]).output();
     if !made.is_ok_and(|out| out.status.success()) {
         println!("without a German locale: its name alone is set");
     }
@@ -693,7 +721,8 @@ fn gpu_a_locale_with_decimal_commas() {
         (std::fs::read(exr).unwrap(), record["mean"].as_f64().unwrap())
     };
     assert_eq!(render("a.exr", "C"), render("b.exr", "de_DE.UTF-8"));
-    let out = skylit(&[&STILL[..], &["--ao-radius", "0,75", "-o", "a.png"]].concat()).env("LC_ALL", "de_DE.UTF-8").output();
+    let out =
+        skylit(&[&STILL[..], &["--ao-radius", "0,75", "-o", "a.png"]].concat()).env("LC_ALL", "de_DE.UTF-8").output();
     assert_refusal(&out.unwrap(), 64, "0,75", &STILL);
 }
 
@@ -751,7 +780,8 @@ fn files_take_as_much_memory_as_they_may() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| place(&dir, name);
     let channel = |name: &str| Channel { name: name.into(), samples: Samples::F32(vec![0.5; 512 * 256]) };
-    let image = Image { width: 512, height: 256, channels: ["R", "G", "B"].map(channel).to_vec(), metadata: Vec::new() };
+    let image =
+        Image { width: 512, height: 256, channels: ["R", "G", "B"].map(channel).to_vec(), metadata: Vec::new() };
     for name in ["a.png", "a.exr"] {
         output::save(&image, Path::new(&at(name))).unwrap();
     }

@@ -89,9 +89,12 @@ fn gpu_views_of_a_scene() {
     let mut rows = csv::Reader::from_path(&csv).unwrap();
     assert_eq!(rows.records().map(Result::unwrap).count(), record["measurements"].as_array().unwrap().len());
     let drawn = std::fs::read_to_string(&plot).unwrap();
-    for part in
-        ["builtin:stairs, near, still: time against error", "Pareto front", "error over time", "reference&#x27;s own error"]
-    {
+    for part in [
+        "builtin:stairs, near, still: time against error",
+        "Pareto front",
+        "error over time",
+        "reference&#x27;s own error",
+    ] {
         assert!(drawn.contains(part), "{part}");
     }
     let of_what = (record["benchmark"].as_str(), record["settings"]["integrator"].as_str());
@@ -124,7 +127,11 @@ fn gpu_a_baseline() {
     assert!(regressions.iter().all(|r| r["quantity"].as_str().unwrap().ends_with(", ms")), "{regressions:?}");
     assert_eq!(out.status.code(), Some(i32::from(!regressions.is_empty())), "{}", stderr(&out));
     // with other settings nothing is measured
-    fails(&run(&[&compared[..], &["--ao-falloff", "binary"]].concat()), 64, &["its falloff is exponential, not binary"]);
+    fails(
+        &run(&[&compared[..], &["--ao-falloff", "binary"]].concat()),
+        64,
+        &["its falloff is exponential, not binary"],
+    );
 }
 
 /// The plain blend forgets half in a frame, whatever else is wrong with it.
@@ -172,9 +179,16 @@ fn gpu_structures_and_series() {
         return;
     }
     let structures = record(&["--parts", "structures"]);
-    assert!(structures["scenes"][0]["about"].as_str().unwrap().contains("in 125 instances"), "{}", structures["scenes"]);
+    assert!(
+        structures["scenes"][0]["about"].as_str().unwrap().contains("in 125 instances"),
+        "{}",
+        structures["scenes"]
+    );
     let names = contestants(&structures, "builtin:instances:25000", "structures");
-    assert!(names[0] == "first build" && names[1].starts_with("top level, ") && names[2] == "mesh, refitted", "{names:?}");
+    assert!(
+        names[0] == "first build" && names[1].starts_with("top level, ") && names[2] == "mesh, refitted",
+        "{names:?}"
+    );
     for name in &names[1..3] {
         assert!(value(&structures, ["builtin:instances:25000", "structures", name, "update"]) > 0.0, "{name}");
     }
@@ -194,7 +208,8 @@ fn gpu_structures_and_series() {
         assert!(unfiltered.last().unwrap().1 > 0.0, "{sequence}");
     }
     // the fastest has all its frames when it is done; of another the first may take longer than that, on a machine that stumbles
-    let done: Vec<_> = of_part(&all, scene, "by sequence").into_iter().filter(|m| m["quantity"] == "equal-time RMSE").collect();
+    let done: Vec<_> =
+        of_part(&all, scene, "by sequence").into_iter().filter(|m| m["quantity"] == "equal-time RMSE").collect();
     assert!(!done.is_empty() && done.iter().all(|m| m["values"].as_f64().unwrap() > 0.0));
     assert!(of_part(&all, "", "still").is_empty());
 }

@@ -80,7 +80,10 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
         assert!(text.contains(word), "{word}: {text}");
     }
     let record: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
-    assert_eq!((record["benchmark"].as_str(), record["settings"]["integrator"].as_str()), (Some("frames"), Some("path")));
+    assert_eq!(
+        (record["benchmark"].as_str(), record["settings"]["integrator"].as_str()),
+        (Some("frames"), Some("path"))
+    );
     let scene = "builtin:parade";
     let of = |part: &str, quantity: &str| value(&record, [scene, part, "balanced", quantity]);
     let along = |part: &str, quantity: &str| curve(&record, [scene, part, "balanced", quantity]);
@@ -93,8 +96,9 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
     for quantity in ["corrected RMSE", "rel MSE", "bias", "FLIP"] {
         assert!(of("still", quantity).is_finite(), "{quantity}");
     }
-    let passes =
-        |part: &str| -> Vec<&str> { of_part(&record, scene, part).iter().map(|m| m["quantity"].as_str().unwrap()).collect() };
+    let passes = |part: &str| -> Vec<&str> {
+        of_part(&record, scene, part).iter().map(|m| m["quantity"].as_str().unwrap()).collect()
+    };
     // surfaces are known from the first frame
     let at_rest = passes("still, passes");
     assert!(at_rest.contains(&"path_camera") && !at_rest.contains(&"path_surface"), "{at_rest:?}");
@@ -111,7 +115,9 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
     assert!(of("turn", "left") > 0.0 && errors[0].1 > errors[7].1, "{errors:?}");
     let left = along("turn", "left");
     assert!(left.len() == errors.len() && left[0].1 > left[7].1, "{left:?}");
-    assert!(of("sidestep", "recovered").is_finite() && find(&record, [scene, "sidestep", "balanced", "left"]).is_none());
+    assert!(
+        of("sidestep", "recovered").is_finite() && find(&record, [scene, "sidestep", "balanced", "left"]).is_none()
+    );
     let mut rows = csv::Reader::from_path(&csv).unwrap();
     let head = rows.headers().unwrap().clone();
     let column = |name: &str| head.iter().position(|h| h == name).unwrap();

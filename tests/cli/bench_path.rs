@@ -84,7 +84,8 @@ fn gpu_error_against_time() {
     }
     let place = Place::new("", 96);
     let (csv, plot) = (place.at("a.csv"), place.at("a.svg"));
-    let files = ["cornell", "--strategies", "mis,uniform", "--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
+    let files =
+        ["cornell", "--strategies", "mis,uniform", "--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
     let (record, notes) = place.record(&files);
     assert!(!notes.contains("rays"), "a peer that traces rays was asked: {notes}");
     assert_eq!(record["peers"], serde_json::json!(["Fake"]));

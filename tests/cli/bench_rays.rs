@@ -141,14 +141,27 @@ fn gpu_files_of_results() {
     }
     let place = Place::new(&Place::entry("a", "", "baselines = ['k']"));
     let (csv, plot, record) = (place.at("a.csv"), place.at("a.svg"), place.at("a.json"));
-    let args = ["builtin:terrain:200", "builtin:terrain:2000", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "2"];
+    let args = [
+        "builtin:terrain:200",
+        "builtin:terrain:2000",
+        "--kernels",
+        "wide,nearest",
+        "--rays",
+        "2000",
+        "--repeats",
+        "2",
+    ];
     let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
     let out = place.run(&[&args[..], &files, &[&format!("--json={}", record.display())]].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
-    for word in
-        ["builtin:terrain:2000:\n  2,000 triangles", "shuffled-any", "x a k", "no faster than log n: ", "bytes a primitive"]
-    {
+    for word in [
+        "builtin:terrain:2000:\n  2,000 triangles",
+        "shuffled-any",
+        "x a k",
+        "no faster than log n: ",
+        "bytes a primitive",
+    ] {
         assert!(text.contains(word), "{word}: {text}");
     }
     let mut rows = csv::Reader::from_path(&csv).unwrap();
@@ -160,7 +173,10 @@ fn gpu_files_of_results() {
     let quantity = head.iter().position(|h| h == "quantity").unwrap();
     assert_eq!(rows.records().map(Result::unwrap).filter(|r| &r[quantity] == "rate").count(), 2 * 5 * 3);
     let drawn = std::fs::read_to_string(&plot).unwrap();
-    assert!(drawn.starts_with("<svg") && drawn.contains("shuffled-any") && drawn.contains("as 1 &#x2f; log n"), "{drawn}");
+    assert!(
+        drawn.starts_with("<svg") && drawn.contains("shuffled-any") && drawn.contains("as 1 &#x2f; log n"),
+        "{drawn}"
+    );
     let record: Value = serde_json::from_slice(&std::fs::read(&record).unwrap()).unwrap();
     let laws = record["measurements"].as_array().unwrap().iter().filter(|m| m["quantity"] == "worst x log n");
     assert_eq!(laws.count(), 5 * 3);
@@ -211,7 +227,8 @@ fn gpu_refusals_leave_the_rest() {
         return;
     }
     let place = Place::new("");
-    let args = ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
+    let args =
+        ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
     let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
     assert_eq!(record["settings"]["build"], "fast");
     let notes = record["notes"].to_string();
@@ -252,8 +269,17 @@ fn gpu_time_limit_and_interruption() {
     }
     let place = Place::new(&Place::entry("a", "", ""));
     // over before anything starts: one round of one stream is measured all the same
-    let args =
-        ["builtin:plane", "builtin:stairs", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "1000", "--check"];
+    let args = [
+        "builtin:plane",
+        "builtin:stairs",
+        "--kernels",
+        "wide,nearest",
+        "--rays",
+        "2000",
+        "--repeats",
+        "1000",
+        "--check",
+    ];
     let record = json(&place.run(&[&args[..], &["--time-limit", "0.000001", "--json"]].concat()));
     assert_eq!(record["stopped_early"], true);
     assert_eq!(scenes(&record), ["builtin:plane"]);
@@ -328,7 +354,11 @@ fn gpu_a_stream_without_contestants_is_named() {
     fails(&out, 64, &["nothing was measured", "ao-any: no contestant takes part"]);
     let record = json(&place.run(&[&args[..], &["ao-any,primary", "--check", "--json"]].concat()));
     assert!(of_part(&record, "", "ao-any").is_empty() && !of_part(&record, "", "primary").is_empty());
-    assert!(record["notes"].to_string().contains("hits not checked: only 'packet' traces these rays"), "{}", record["notes"]);
+    assert!(
+        record["notes"].to_string().contains("hits not checked: only 'packet' traces these rays"),
+        "{}",
+        record["notes"]
+    );
 }
 
 /// The real peer, where it can be built: it loads triangles, instances and spheres, and agrees with us.

@@ -140,9 +140,15 @@ fn saved_records_are_shown_and_plotted() {
     }
     let drawn = std::fs::read_to_string(&svg).unwrap();
     assert!(drawn.starts_with("<svg") && drawn.trim_end().ends_with("</svg>"));
-    for part in
-        ["still: time against error", "error over time", "quality", "larsen", "Pareto front", "primary", "cornell, images"]
-    {
+    for part in [
+        "still: time against error",
+        "error over time",
+        "quality",
+        "larsen",
+        "Pareto front",
+        "primary",
+        "cornell, images",
+    ] {
         assert!(drawn.contains(part), "{part}");
     }
     // presets of which nothing was measured have no place in the legend
@@ -205,7 +211,10 @@ fn noise_is_no_regression_and_a_slowdown_is() {
     let regressions = record["records"][0]["baseline"]["regressions"].as_array().unwrap();
     assert_eq!(regressions.len(), 2);
     for r in regressions {
-        assert_eq!((r["quantity"].as_str(), r["before"].as_f64(), r["now"].as_f64()), (Some("time, ms"), Some(5.0), Some(6.0)));
+        assert_eq!(
+            (r["quantity"].as_str(), r["before"].as_f64(), r["now"].as_f64()),
+            (Some("time, ms"), Some(5.0), Some(6.0))
+        );
         assert!((r["worse_by"].as_f64().unwrap() - 0.2).abs() < 1e-9 && r["noise"].as_f64().unwrap() < 0.1);
     }
     // and the other way round it is better

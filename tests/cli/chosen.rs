@@ -42,9 +42,13 @@ fn gpu_printed_options_choose_the_same() {
         let options = words(options);
         let render = |output: &str, chosen: &[String]| {
             let first = ["render", &scene, "-o", output, "--size", "48x24", "--json"].map(str::to_owned);
-            let all: Vec<String> = first.into_iter().chain(options.iter().cloned()).chain(chosen.iter().cloned()).collect();
-            let all: Vec<&str> =
-                all.iter().map(String::as_str).filter(|w| chosen.is_empty() || !["--view", "iso"].contains(w)).collect();
+            let all: Vec<String> =
+                first.into_iter().chain(options.iter().cloned()).chain(chosen.iter().cloned()).collect();
+            let all: Vec<&str> = all
+                .iter()
+                .map(String::as_str)
+                .filter(|w| chosen.is_empty() || !["--view", "iso"].contains(w))
+                .collect();
             json(&run(&all))
         };
         let pattern = |path: &str| {
@@ -74,7 +78,8 @@ fn gpu_printed_options_choose_the_same() {
     // `info` says the same for the size that is asked about
     let info = json(&run(&["info", &scene, "--size", "48x24", "--json"]));
     let suggested = |key: &str| words(info["suggestions"][key].as_str().unwrap());
-    let text = run(&["render", &scene, "-o", &a, "--size", "48x24", "--integrator", "path", "--spp", "1", "--max-depth", "1"]);
+    let text =
+        run(&["render", &scene, "-o", &a, "--size", "48x24", "--integrator", "path", "--spp", "1", "--max-depth", "1"]);
     let text = String::from_utf8(text.stdout).unwrap();
     for word in suggested("camera").iter().chain(&suggested("light")) {
         assert!(text.contains(word.as_str()), "{word}: {text}");
@@ -109,8 +114,20 @@ fn gpu_commands_of_ao_vs_path_have_the_error_that_it_finds() {
     let promised = fit["best"]["rmse"].as_f64().unwrap();
     // the light that `render` takes by itself
     let by_itself = place(&dir, "by-itself.exr");
-    let path =
-        ["render", &scene, "-o", &by_itself, "--integrator", "path", "--size", "64x36", "--spp", "64", "--max-depth", "4"];
+    let path = [
+        "render",
+        &scene,
+        "-o",
+        &by_itself,
+        "--integrator",
+        "path",
+        "--size",
+        "64x36",
+        "--spp",
+        "64",
+        "--max-depth",
+        "4",
+    ];
     let rendered = json(&run(&[&path[..], &["--json"]].concat()));
     assert_eq!(rendered["chosen"], record["chosen"]);
 

@@ -10,9 +10,15 @@ use skylit::output::{self, Channel, Image, Samples};
 use crate::common::command::{device, fails, json, place, refuses, run, stderr};
 
 /// Writes an image of 8 x 4 pixels whose channels have these values.
-fn write(dir: &tempfile::TempDir, name: &str, channels: &[(&str, &dyn Fn(usize) -> f32)], metadata: &[(&str, &str)]) -> String {
+fn write(
+    dir: &tempfile::TempDir,
+    name: &str,
+    channels: &[(&str, &dyn Fn(usize) -> f32)],
+    metadata: &[(&str, &str)],
+) -> String {
     let samples = |value: &dyn Fn(usize) -> f32| Samples::F32((0..32).map(value).collect());
-    let channels = channels.iter().map(|(name, value)| Channel { name: (*name).into(), samples: samples(value) }).collect();
+    let channels =
+        channels.iter().map(|(name, value)| Channel { name: (*name).into(), samples: samples(value) }).collect();
     let metadata = metadata.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     let path = place(dir, name);
     output::save(&Image { width: 8, height: 4, channels, metadata }, path.as_ref()).unwrap();
@@ -128,7 +134,11 @@ fn wrong_usage() {
     refuses(&["compare", "a.exr", "--a", "ao"], 64, "--scene");
     refuses(&["compare", "--scene", "builtin:plane", "--b", "ao"], 64, "image A is missing");
     refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "oa"], 64, "oa");
-    refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao --max-depth 2"], 64, "--max-depth has no effect");
+    refuses(
+        &["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao --max-depth 2"],
+        64,
+        "--max-depth has no effect",
+    );
     refuses(
         &["compare", "--scene", "builtin:plane", "--a", "fast", "--b", "ao", "--frames", "0..4"],
         64,
@@ -195,8 +205,18 @@ fn gpu_presets_have_a_first_frame() {
     let [csv, saved] = ["table.csv", "saved"].map(|n| place(&dir, n));
     let scene = ["compare", "--scene", "builtin:stairs", "--size", "48x27", "--ao-radius", "2", "--json"];
     let of = |options: &[&str]| json(&run(&[&scene[..], options].concat()));
-    let record =
-        of(&["--a", "balanced --filter none", "--c", "balanced", "--b", "ao --spp 64", "--csv", &csv, "--save", &saved]);
+    let record = of(&[
+        "--a",
+        "balanced --filter none",
+        "--c",
+        "balanced",
+        "--b",
+        "ao --spp 64",
+        "--csv",
+        &csv,
+        "--save",
+        &saved,
+    ]);
     let images = record["images"].as_array().unwrap();
     let names: Vec<&str> = images.iter().map(|i| i["name"].as_str().unwrap()).collect();
     let first = ["balanced --filter none --warm-up 0", "balanced --warm-up 0"];
@@ -220,8 +240,20 @@ fn gpu_presets_have_a_first_frame() {
     assert_eq!(rows, [rmse(0), rmse(2), rmse(3), rmse(4)]);
 
     // as asked: in motion all have the same camera, and a history that is kept has its filter
-    let motion =
-        ["--a", "balanced", "--b", "ao", "--c", "balanced --filter none", "--frames", "0..4", "--orbit", "40", "--spp", "16"];
+    let motion = [
+        "--a",
+        "balanced",
+        "--b",
+        "ao",
+        "--c",
+        "balanced --filter none",
+        "--frames",
+        "0..4",
+        "--orbit",
+        "40",
+        "--spp",
+        "16",
+    ];
     let record = of(&motion);
     assert_eq!(record["images"].as_array().unwrap().len(), 3, "{record}");
     assert!(!record["warnings"].to_string().contains("differ in their camera"), "{record}");

@@ -29,7 +29,10 @@ fn gpu_compare_ao_says_what_fits_best() {
     let page = std::fs::read_to_string(dir.path().join("report/index.html")).unwrap();
     assert!(page.contains("AO with the best radius") && page.contains("Error over radius"));
     let drawn = std::fs::read_to_string(&plot).unwrap();
-    assert!(drawn.starts_with("<svg") && drawn.contains("AO radius, scene units") && drawn.contains("binary"), "{drawn}");
+    assert!(
+        drawn.starts_with("<svg") && drawn.contains("AO radius, scene units") && drawn.contains("binary"),
+        "{drawn}"
+    );
     let image = skylit::output::load(layers.as_ref()).unwrap();
     assert_eq!((image.width, image.height), (48, 32));
     for channel in ["R", "path.G", "direct.B", "ao.Y", "sky.Y"] {
@@ -41,7 +44,8 @@ fn gpu_compare_ao_says_what_fits_best() {
     assert!(!stderr(&out).contains("all but black"), "{}", stderr(&out));
     assert!(out.status.success() && !text.contains("NaN"), "{text}");
     assert!(text.contains("AO with the best radius") && text.contains("Ambient visibility against ao-sky"), "{text}");
-    let command = text.lines().find(|l| l.starts_with("skylit render builtin:cornell-box --integrator lit")).expect(&text);
+    let command =
+        text.lines().find(|l| l.starts_with("skylit render builtin:cornell-box --integrator lit")).expect(&text);
     let image = place(&dir, "lit.exr");
     // of options that are given twice the last one counts
     let command = command.strip_suffix(" -o lit.exr").unwrap();
@@ -62,8 +66,19 @@ fn compare_ao_refuses_what_makes_no_sense() {
         return;
     }
     refuses(&["compare", "ao-vs-path", "no-such-file.glb"], 3, "no-such-file.glb");
-    let away =
-        ["compare", "ao-vs-path", "builtin:plane", "--eye", "0,5,0", "--target", "0,9,0", "--up", "1,0,0", "--size", "16x16"];
+    let away = [
+        "compare",
+        "ao-vs-path",
+        "builtin:plane",
+        "--eye",
+        "0,5,0",
+        "--target",
+        "0,9,0",
+        "--up",
+        "1,0,0",
+        "--size",
+        "16x16",
+    ];
     refuses(&away, 3, "shows no surface");
     let many = ["compare", "ao-vs-path", "builtin:plane", "--size", "4096x4096", "--ao-samples", "4096"];
     refuses(&many, 64, "--ao-samples");

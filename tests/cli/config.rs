@@ -33,7 +33,8 @@ impl Place {
     }
 
     fn run(&self, line: &str) -> Output {
-        let words: Vec<String> = line.split(' ').map(|w| w.replace('@', &format!("{}/", self.dir.path().display()))).collect();
+        let words: Vec<String> =
+            line.split(' ').map(|w| w.replace('@', &format!("{}/", self.dir.path().display()))).collect();
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         skylit(&words).env("XDG_CONFIG_HOME", self.dir.path().join("config")).output().unwrap()
     }
@@ -44,7 +45,10 @@ impl Place {
 }
 
 fn wrote(folder: &Path) -> usize {
-    std::fs::read_dir(folder).unwrap().filter(|f| f.as_ref().unwrap().path().extension().is_some_and(|e| e == "exr")).count()
+    std::fs::read_dir(folder)
+        .unwrap()
+        .filter(|f| f.as_ref().unwrap().path().extension().is_some_and(|e| e == "exr"))
+        .count()
 }
 
 #[test]
@@ -67,7 +71,10 @@ fn gpu_files_settings_and_options_in_their_order() {
     // of another integrator, and of frames in real time: no error, and no frames
     assert_eq!(first["unused"], value!(["frames.history", "integrators.path.max_depth"]));
     assert_eq!(first["file"].as_str(), Some(&*place.at("config/skylit/skylit.toml")));
-    assert_eq!(second["settings"], value!({ "image.seed": 2, "image.size": [16, 16], "integrators.ao.ao_radius": 1.5 }));
+    assert_eq!(
+        second["settings"],
+        value!({ "image.seed": 2, "image.size": [16, 16], "integrators.ao.ao_radius": 1.5 })
+    );
     assert_eq!(second["file"].as_str(), Some(&*place.at("scenes/skylit.toml")));
 
     // then a file of settings, .toml or .json, then options
@@ -140,15 +147,17 @@ fn gpu_verify_and_compare_read_no_defaults() {
     let wrong = "[image]\nsppp = 2";
     let place = Place::new(wrong, wrong);
     fails(&place.run("render @scenes/stairs.glb -o @a.exr"), 3, &["sppp"]);
-    let frame =
-        "[[frame]]\nname = \"a\"\nscene = \"stairs.glb\"\nrender = \"ao --size 16x16 --spp 4\"\ntolerance = \"exact\"\n";
+    let frame = "[[frame]]\nname = \"a\"\nscene = \"stairs.glb\"\nrender = \"ao --size 16x16 --spp 4\"\ntolerance = \"exact\"\n";
     std::fs::write(place.at("scenes/frames.toml"), frame).unwrap();
     let record = place.record("verify @scenes --bless --force");
     assert_eq!(record["frames"].as_array().map(Vec::len), Some(1));
     // files that could be read, and would change the image
     for folder in ["config/skylit", "scenes"] {
-        std::fs::write(place.at(&format!("{folder}/skylit.toml")), "[image]\nseed = 9\n[integrators.ao]\nao_radius = 0.01")
-            .unwrap();
+        std::fs::write(
+            place.at(&format!("{folder}/skylit.toml")),
+            "[image]\nseed = 9\n[integrators.ao]\nao_radius = 0.01",
+        )
+        .unwrap();
     }
     assert!(place.run("verify @scenes").status.success());
     let out = place.run("compare --scene @scenes/stairs.glb --a ao --b ao --size 16x16 --spp 4");

@@ -39,9 +39,10 @@ impl Place {
     fn outside(&self, extension: &str) -> Vec<String> {
         let absolute = self.top.path().join(format!("secret.{extension}"));
         let absolute = absolute.to_str().unwrap();
-        let mut names: Vec<String> = ["../secret", "maps/../../secret", "link", "up/secret", "../scene/own", "..\\secret"]
-            .map(|name| format!("{name}.{extension}"))
-            .into();
+        let mut names: Vec<String> =
+            ["../secret", "maps/../../secret", "link", "up/secret", "../scene/own", "..\\secret"]
+                .map(|name| format!("{name}.{extension}"))
+                .into();
         // whether a file is there is not told either
         names.extend([format!("../none.{extension}"), "/none/such".into(), absolute.into()]);
         names
@@ -93,9 +94,12 @@ fn buffers_and_images_of_gltf() {
         scene("own.bin", &name);
         place.refuses("scene/s.gltf", &name);
     }
-    for (buffer, image) in
-        [("own.bin", "own.png"), ("maps/inner.bin", "maps/../own.png"), ("./own.bin", "alias.png"), ("alias.bin", "none.png")]
-    {
+    for (buffer, image) in [
+        ("own.bin", "own.png"),
+        ("maps/inner.bin", "maps/../own.png"),
+        ("./own.bin", "alias.png"),
+        ("alias.bin", "none.png"),
+    ] {
         scene(buffer, image);
         place.accepts("scene/s.gltf");
     }
@@ -249,7 +253,8 @@ fn manifests_of_verify() {
     };
     let verify = |options: &[&str]| place.run(&[&["verify", "scene"], options].concat());
     let refused = |what: &str| {
-        let said = |out: std::process::Output| (out.status.code(), stderr(&out) + &String::from_utf8_lossy(&out.stdout));
+        let said =
+            |out: std::process::Output| (out.status.code(), stderr(&out) + &String::from_utf8_lossy(&out.stdout));
         let (code, text) = said(verify(&["--confine"]));
         assert!(
             code == Some(2) && text.contains("which --confine does not allow") && text.contains("frames.toml: line"),

@@ -26,6 +26,9 @@ fn gpu_a_camera_a_radius_and_an_exposure_are_suggested() {
     assert_eq!(suggestions["ao_mean"].as_f64(), Some(0.0));
     let radius = suggestions["ao_radius"].as_f64().unwrap();
     assert!(radius > 0.0 && radius < record["inventory"]["diagonal"].as_f64().unwrap(), "{record}");
-    assert!(suggestions["exposure"].is_number() && suggestions["camera"].as_str().unwrap().contains("--camera 0"), "{record}");
+    assert!(
+        suggestions["exposure"].is_number() && suggestions["camera"].as_str().unwrap().contains("--camera 0"),
+        "{record}"
+    );
     assert!(device["frame_ms"].as_f64().unwrap() > 0.0 && device["structure_bytes"].as_u64().unwrap() > 0, "{record}");
 }

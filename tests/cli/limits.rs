@@ -38,7 +38,11 @@ fn with_processes(limit: usize, home: &Path, args: &[&str]) -> Command {
     let mut command = Command::new("setpriv");
     command.args(["--reuid", &USER.to_string(), "--clear-groups", "prlimit", &format!("--nproc={limit}")]);
     command.arg(skylit(&[]).get_program()).args(args).current_dir(home);
-    command.env("HOME", home).env_remove("XDG_CACHE_HOME").env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE");
+    command
+        .env("HOME", home)
+        .env_remove("XDG_CACHE_HOME")
+        .env("XDG_CONFIG_HOME", "/nonexistent")
+        .env_remove("RUST_BACKTRACE");
     command
 }
 
@@ -146,13 +150,21 @@ fn variables_of_drivers() {
 fn broken_manifests_of_drivers() {
     let dir = tempfile::tempdir().unwrap();
     let file = place(&dir, "garbage.json");
-    for text in
-        ["{\"x", "", "[1, 2]", "{\"ICD\": [1]}", "{\"ICD\": {\"library_path\": \"/no/such.so\", \"api_version\": \"1.3.0\"}}"]
-    {
+    for text in [
+        "{\"x",
+        "",
+        "[1, 2]",
+        "{\"ICD\": [1]}",
+        "{\"ICD\": {\"library_path\": \"/no/such.so\", \"api_version\": \"1.3.0\"}}",
+    ] {
         std::fs::write(&file, text).unwrap();
         let mut command = skylit(&["doctor"]);
         command.env("VK_DRIVER_FILES", &file).env("VK_ICD_FILENAMES", &file);
-        fails(&in_time(command), 2, &["VK_DRIVER_FILES names ", "garbage.json, which is no manifest of a Vulkan driver: "]);
+        fails(
+            &in_time(command),
+            2,
+            &["VK_DRIVER_FILES names ", "garbage.json, which is no manifest of a Vulkan driver: "],
+        );
     }
     // of layers, too
     std::fs::write(&file, "{").unwrap();
@@ -180,7 +192,8 @@ fn gpu_folders_of_the_user_that_are_relative() {
     let home = place(&dir, "home");
     for (values, notes) in [(["home", "cache", "settings"], 3), (["", "", ""], 0), ([&home, "./cache", ""], 1)] {
         for quiet in [false, true] {
-            let mut command = skylit(&["render", "builtin:plane", "--size", "8x8", "--spp", "1", "--json", "-o", "../a.exr"]);
+            let mut command =
+                skylit(&["render", "builtin:plane", "--size", "8x8", "--spp", "1", "--json", "-o", "../a.exr"]);
             command.envs(variables.into_iter().zip(values)).current_dir(dir.path().join("here"));
             // a width that the driver's cache is kept apart for
             command.env("LP_NATIVE_VECTOR_WIDTH", "128");

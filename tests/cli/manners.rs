@@ -37,7 +37,9 @@ fn three_helps() {
         // examples first, then options by what they are about
         let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text}: {help}"));
         assert!(
-            at("Examples:") < at("Arguments:") && at("Arguments:") < at("Image:") && at("Camera:") < at("Ambient occlusion:")
+            at("Examples:") < at("Arguments:")
+                && at("Arguments:") < at("Image:")
+                && at("Camera:") < at("Ambient occlusion:")
         );
     }
     assert_eq!(all, stdout(&["render", "no-such.glb", "--help-all"]));
@@ -74,7 +76,10 @@ fn versions() {
     assert_eq!(text.lines().next(), Some(&*format!("skylit {version}")));
     assert_eq!((values("commit").len(), values("features").len()), (1, 1), "{text}");
     let features: Vec<&str> = values("features")[0].split(", ").collect();
-    assert!(["bench", "cli", "compare"].iter().all(|f| features.contains(f)) && !features.contains(&"default"), "{text}");
+    assert!(
+        ["bench", "cli", "compare"].iter().all(|f| features.contains(f)) && !features.contains(&"default"),
+        "{text}"
+    );
     assert!(!values("vulkan").is_empty(), "{text}");
     if device() {
         let record = json(&run(&["doctor", "--json"]));
@@ -85,8 +90,11 @@ fn versions() {
         }
     }
     // no device is no reason to fail
-    let out =
-        skylit(&["--version"]).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+    let out = skylit(&["--version"])
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .output()
+        .unwrap();
     let text = String::from_utf8(out.stdout).unwrap();
     assert!(out.status.success() && text.contains("no device found") | text.contains("not available: "), "{text}");
 }
@@ -144,7 +152,9 @@ fn manual_pages() {
     let mut names: Vec<_> =
         std::fs::read_dir(&folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
-    for name in ["skylit.1", "skylit-render.1", "skylit-bench-ao.1", "skylit-compare-ao-vs-path.1", "skylit-completions.1"] {
+    for name in
+        ["skylit.1", "skylit-render.1", "skylit-bench-ao.1", "skylit-compare-ao-vs-path.1", "skylit-completions.1"]
+    {
         assert!(names.contains(&name.to_owned()), "{name}: {names:?}");
     }
     assert!(!names.iter().any(|n| n.contains("help") || n.contains("man")), "{names:?}");
@@ -175,8 +185,10 @@ fn gpu_times_add_up() {
     let (exr, png) = (place(&dir, "a.exr"), place(&dir, "a.png"));
     let still = ["render", "builtin:cornell-box", "--size", "96x64", "--spp", "2", "--integrator", "path", "-o", &exr];
     let frames = ["render", "builtin:cornell-box", "--size", "96x64", "--preset", "fast", "-o", &png];
-    let (ao, path): (&[&str], &[&str]) =
-        (&["open", "survey", "frames", "warm-up", "write"], &["open", "survey", "trace", "compile", "write", "denoise"]);
+    let (ao, path): (&[&str], &[&str]) = (
+        &["open", "survey", "frames", "warm-up", "write"],
+        &["open", "survey", "trace", "compile", "write", "denoise"],
+    );
     // a view that is found by looking at the scene, which is the part `survey`
     let denoised = [&still[..], &["--denoise", "filter", "--view", "iso"]].concat();
     for (args, expected) in [(&denoised, path), (&frames.to_vec(), ao)] {
@@ -187,7 +199,8 @@ fn gpu_times_add_up() {
         for name in expected {
             assert!(of(name) > 0.0, "{name}: {seconds}");
         }
-        let (sum, total): (f64, f64) = (parts.values().filter_map(Value::as_f64).sum(), seconds["total"].as_f64().unwrap());
+        let (sum, total): (f64, f64) =
+            (parts.values().filter_map(Value::as_f64).sum(), seconds["total"].as_f64().unwrap());
         assert!((sum - total).abs() < 1e-6 * total, "{sum} of {seconds}");
         // what the program does beside: reading its arguments, composing the report
         assert!(of("other") < 0.05 + 0.05 * total, "{seconds}");
@@ -217,14 +230,28 @@ fn gpu_progress_in_a_log() {
     let dir = tempfile::tempdir().unwrap();
     let png = place(&dir, "a.##.png");
     let lines = |options: &[&str], seconds: &str| {
-        let args =
-            ["render", "builtin:stairs", "--size", "64x48", "--preset", "fast", "--frames", "0..40", "--orbit", "-o", &png];
+        let args = [
+            "render",
+            "builtin:stairs",
+            "--size",
+            "64x48",
+            "--preset",
+            "fast",
+            "--frames",
+            "0..40",
+            "--orbit",
+            "-o",
+            &png,
+        ];
         let out = skylit(&[&args[..], options].concat()).env("SKYLIT_PROGRESS_SECONDS", seconds).output().unwrap();
         assert!(out.status.success(), "{}", stderr(&out));
         stderr(&out).lines().filter(|l| l.starts_with("skylit: rendering: ")).map(str::to_owned).collect::<Vec<_>>()
     };
     let shown = lines(&[], "0.02");
-    assert!((3..40).contains(&shown.len()) && shown[0].contains(" % after ") && shown[0].ends_with(" left"), "{shown:?}");
+    assert!(
+        (3..40).contains(&shown.len()) && shown[0].contains(" % after ") && shown[0].ends_with(" left"),
+        "{shown:?}"
+    );
     for (options, seconds) in [(&["--quiet"][..], "0.001"), (&["--json"], "0.001"), (&[], "0"), (&[], "10")] {
         assert!(lines(options, seconds).is_empty(), "{options:?}");
     }

@@ -105,7 +105,9 @@ fn gpu_pictures_of_a_still() {
     let (exr, png) = (at("p.exr"), at("p.png"));
     let light = ["--integrator", "direct", "--light", "point position=0,20,20 intensity=4000", "--tone-map", "exp"];
     let out = ["-o", &exr, "-o", &png, "--background", "transparent", "--png-bits", "16", "--png-encoding", "linear"];
-    json(&run(&[&["render", "builtin:spheres:30", "--size", "48x32", "--spp", "4", "--json"][..], &light, &out].concat()));
+    json(&run(
+        &[&["render", "builtin:spheres:30", "--size", "48x32", "--spp", "4", "--json"][..], &light, &out].concat()
+    ));
     let image = load(&exr);
     let (r, alpha) = (image.f32("R").unwrap(), image.f32("A").unwrap());
     let (values, channels) = decode(&png);
@@ -117,7 +119,11 @@ fn gpu_pictures_of_a_still() {
     // an environment is behind the scene already
     let sky = ["render", "builtin:plane", "--integrator", "path", "--environment", "1,1,1", "-o", &png];
     refuses(&[&sky[..], &["--background", "transparent"]].concat(), 64, "--background has no effect: the environment");
-    refuses(&["render", "builtin:plane", "--integrator", "ao-sky", "-o", &png, "--background", "0,0,1"], 64, "--background");
+    refuses(
+        &["render", "builtin:plane", "--integrator", "ao-sky", "-o", &png, "--background", "0,0,1"],
+        64,
+        "--background",
+    );
     // depths in 16 bits
     let (depth, numbers) = (at("d.png"), at("d.exr"));
     render(&["--spp", "1", "-o", &numbers, "--aov", "depth", "--depth-image", &depth, "--png-bits", "16"]);
@@ -220,7 +226,8 @@ fn gpu_metadata_tells_the_camera_and_no_path() {
     // the same numbers give the same image
     let pose: serde_json::Value = serde_json::from_str(a.metadata("camera_pose").unwrap()).unwrap();
     assert_eq!(pose, record["camera_pose"]);
-    let vector = |key: &str| pose[key].as_array().unwrap().iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+    let vector =
+        |key: &str| pose[key].as_array().unwrap().iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
     let (eye, target, up, fov) = (vector("eye"), vector("target"), vector("up"), pose["fov_y"].to_string());
     let camera = ["--eye", &eye, "--target", &target, "--up", &up, "--fov-y", &fov];
     json(&run(&[&base[..], &camera, &["--spp", "2", "-o", &again]].concat()));
@@ -348,7 +355,8 @@ impl FakeTev {
                 let [x, y, width, height] = std::array::from_fn(|_| fields.word() as usize);
                 let offsets: Vec<_> = (0..count).map(|_| fields.long()).collect();
                 let strides: Vec<_> = (0..count).map(|_| fields.long()).collect();
-                let values: Vec<f32> = fields.0.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+                let values: Vec<f32> =
+                    fields.0.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
                 let across = self.sizes[&name][0] as usize;
                 for (c, channel) in channels.iter().enumerate() {
                     let plane = self.images.get_mut(&name).unwrap().get_mut(channel).unwrap();
@@ -388,7 +396,9 @@ fn gpu_tev_shows_the_image_while_it_renders() {
         for (name, shown) in channels {
             let channel = image.channels.iter().find(|c| c.name == *name).unwrap();
             match &channel.samples {
-                Samples::F32(values) => assert!(values.iter().zip(shown).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}"),
+                Samples::F32(values) => {
+                    assert!(values.iter().zip(shown).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}")
+                }
                 Samples::U32(values) => assert!(values.iter().zip(shown).all(|(a, b)| *a as f32 == *b), "{name}"),
             }
         }

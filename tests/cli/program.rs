@@ -15,7 +15,9 @@ fn path(p: &Path) -> &str {
 
 #[test]
 fn help_and_version() {
-    for args in [&["--help"][..], &["-h"], &["--version"], &["render", "--help"], &["doctor", "-h"], &["diff", "--help"]] {
+    for args in
+        [&["--help"][..], &["-h"], &["--version"], &["render", "--help"], &["doctor", "-h"], &["diff", "--help"]]
+    {
         let out = run(args);
         assert!(out.status.success() && out.stderr.is_empty() && !out.stdout.is_empty(), "{args:?}");
     }
@@ -34,8 +36,16 @@ fn usage_errors() {
     refuses(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
     refuses(&render(&["--aov", "bent"]), 64, "--aov bent is for frames in real time");
     refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is for pictures");
-    refuses(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
-    refuses(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
+    refuses(
+        &["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"],
+        64,
+        "counts no samples",
+    );
+    refuses(
+        &["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"],
+        64,
+        "technique traced",
+    );
     refuses(&render(&["--preset", "larsen", "--history", "8"]), 64, "--history has no effect on --preset larsen");
     refuses(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
     refuses(&render(&["--size", "0x5"]), 64, "at least 1");
@@ -54,7 +64,11 @@ fn usage_errors() {
     refuses(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     refuses(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
     refuses(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no BVH");
-    refuses(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset selects frames");
+    refuses(
+        &render(&["--resumable", "--preset", "fast"]),
+        64,
+        "--resumable is for stills, and --preset selects frames",
+    );
     refuses(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
     refuses(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
     refuses(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");
@@ -128,7 +142,11 @@ fn no_driver_is_exit_code_2() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("a.png");
     for args in [&["doctor"][..], &["render", "builtin:plane", "-o", path(&file)]] {
-        let out = skylit(args).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+        let out = skylit(args)
+            .env("VK_DRIVER_FILES", "/nonexistent")
+            .env("VK_ICD_FILENAMES", "/nonexistent")
+            .output()
+            .unwrap();
         assert_refusal(&out, 2, "Vulkan", args);
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
@@ -141,7 +159,18 @@ fn gpu_kept_hierarchies() {
     let cache = dir.path().join("kept");
     let render = |name: &str, cache: &Path| {
         let image = dir.path().join(name);
-        let args = ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "64x48", "--spp", "1", "--build", "best"];
+        let args = [
+            "render",
+            "builtin:cornell-box",
+            "--tracer",
+            "compute",
+            "--size",
+            "64x48",
+            "--spp",
+            "1",
+            "--build",
+            "best",
+        ];
         let out = skylit(&args).args(["-o", path(&image), "--bvh-cache", path(cache)]).output().unwrap();
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         assert!(out.status.success(), "{said}");
@@ -214,7 +243,9 @@ fn diff_judges_colour() {
     assert!(run(&["diff", &depth, &depth, "--channels", "depth.Z", "--max-rmse", "0"]).status.success());
     refuses(&["diff", &short, &flat], 1, "16x16 and 16x8");
     let record = json(&run(&["diff", &short, &long, "--json"]));
-    assert!((record["compared"]["bias"].as_f64().unwrap() + 0.01).abs() < 1e-6 && record["covered_pixels_only"] == true);
+    assert!(
+        (record["compared"]["bias"].as_f64().unwrap() + 0.01).abs() < 1e-6 && record["covered_pixels_only"] == true
+    );
 }
 
 /// A comparison of nothing fails, with or without a limit, in `diff` and `compare`; the mask is named.
@@ -229,7 +260,8 @@ fn a_comparison_of_nothing_fails() {
         save(&Image { width: 16, height: 16, channels, metadata: Vec::new() }, &file).unwrap();
         path(&file).to_owned()
     };
-    let [sky, night, black] = [("sky.exr", 1.0), ("night.exr", 0.25), ("black.exr", 0.0)].map(|(n, v)| write(n, v, 0.0));
+    let [sky, night, black] =
+        [("sky.exr", 1.0), ("night.exr", 0.25), ("black.exr", 0.0)].map(|(n, v)| write(n, v, 0.0));
     let nan = write("nan.exr", f32::NAN, 1.0);
     refuses(&["diff", &sky, &night, "--max-rmse", "0.1", "--quiet"], 1, "RMSE of 7.500e-1");
     let record = json(&run(&["diff", &sky, &night, "--json"]));
@@ -240,7 +272,11 @@ fn a_comparison_of_nothing_fails() {
     let text = String::from_utf8(run(&["diff", &sky, &night]).stdout).unwrap();
     assert!(text.contains("over covered pixels and background that is not black"), "{text}");
     for limit in [&["--max-rmse", "10"][..], &[]] {
-        refuses(&[&["diff", &black, &black, "--quiet"], limit].concat(), 1, "have no pixel of the mask (covered pixels)");
+        refuses(
+            &[&["diff", &black, &black, "--quiet"], limit].concat(),
+            1,
+            "have no pixel of the mask (covered pixels)",
+        );
         refuses(&[&["diff", &nan, &nan, "--quiet"], limit].concat(), 1, "256 pixels are not a number (NaN) in both");
         refuses(&[&["diff", &nan, &sky, "--quiet"], limit].concat(), 1, "not a number (NaN) in one of them only");
     }
@@ -278,8 +314,18 @@ fn gpu_frames_as_pictures() {
     }
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| path(&dir.path().join(name)).to_owned();
-    let base =
-        ["render", "builtin:stairs", "--size", "64x48", "--preset", "fast", "--frames", "2..4", "--validation", "--json"];
+    let base = [
+        "render",
+        "builtin:stairs",
+        "--size",
+        "64x48",
+        "--preset",
+        "fast",
+        "--frames",
+        "2..4",
+        "--validation",
+        "--json",
+    ];
     let (exr, png, apng) = (at("a.##.exr"), at("a.##.png"), at("a.apng"));
     let record = json(&run(&[&base[..], &["--aov", "bent", "-o", &exr, "-o", &png, "-o", &apng]].concat()));
     assert!(record["passes"]["display"].is_object() && record["mean"].as_f64().unwrap() > 0.1);
@@ -371,7 +417,11 @@ fn gpu_render_end_to_end() {
         assert_eq!(record["triangle_test"], "watertight");
         let told = record["explain"].as_array().unwrap().iter().any(|l| l.as_str().unwrap().contains(traversal));
         assert!(told, "{}", record["explain"]);
-        assert!((record["mean"].as_f64().unwrap() - mean).abs() < 1e-4, "{traversal}: {} is not {mean}", record["mean"]);
+        assert!(
+            (record["mean"].as_f64().unwrap() - mean).abs() < 1e-4,
+            "{traversal}: {} is not {mean}",
+            record["mean"]
+        );
     }
     let other = ["--tracer", "pipeline", "--traversal", "nearest"];
     refuses(&[&base[..], &[&png], &other].concat(), 64, "--tracer compute");

@@ -119,7 +119,8 @@ fn an_export_does_not_replace_what_lies_beside_it() {
     let again = export("export s.gltf out.gltf");
     assert!(again.status.success(), "{}", stderr(&again));
     assert!(
-        export("export builtin:plane new.gltf").status.success() && export("export builtin:plane new.gltf").status.success()
+        export("export builtin:plane new.gltf").status.success()
+            && export("export builtin:plane new.gltf").status.success()
     );
 }
 
@@ -162,10 +163,22 @@ fn a_render_names_each_output_once() {
             ("render s.gltf -o a.png --depth-image sub/../a.png", "two outputs would be one file"),
             ("render s.gltf -o link.png -o hard.png", "two outputs would be one file"),
             ("render s.gltf -o a.exr --depth-image a.exr", "a.exr: two outputs would be one file"),
-            ("render s.gltf -o a.#.png -o a.##.png --preset fast --frames 0..12", "a.10.png: two outputs would be one file"),
-            ("render s.gltf -o new.png --integrator path --environment t.png -o t.png", "-o would replace --environment"),
-            ("render s.gltf -o link.png --integrator path --environment t.png", "-o would replace --environment (t.png)"),
-            ("render s.gltf -o keys.png --preset fast --camera-path keys.png --frames 0..1", "-o would replace --camera-path"),
+            (
+                "render s.gltf -o a.#.png -o a.##.png --preset fast --frames 0..12",
+                "a.10.png: two outputs would be one file",
+            ),
+            (
+                "render s.gltf -o new.png --integrator path --environment t.png -o t.png",
+                "-o would replace --environment",
+            ),
+            (
+                "render s.gltf -o link.png --integrator path --environment t.png",
+                "-o would replace --environment (t.png)",
+            ),
+            (
+                "render s.gltf -o keys.png --preset fast --camera-path keys.png --frames 0..1",
+                "-o would replace --camera-path",
+            ),
             ("render s.gltf -o a.exr --depth-image t.exr --resume t.exr", "--depth-image would replace --resume"),
         ],
     );
@@ -200,14 +213,23 @@ fn gpu_a_render_does_not_replace_files_of_its_scene() {
             ("render s.gltf -o link.png --size 8x8 --spp 1", "link.png: -o would replace a file of the scene"),
             ("render s.gltf -o new.png -o hard.png --size 8x8 --spp 1", "-o would replace a file of the scene"),
             ("render m.obj -o t.png --size 8x8 --spp 1", "-o would replace a file of the scene"),
-            ("render f.gltf -o new.png --dump-rays set --size 8x8 --spp 1", "--dump-rays would replace a file of the scene"),
-            ("render f.gltf -o t.####.png --size 8x8 --preset fast --frames 0..3", "t.0001.png: -o would replace a file"),
+            (
+                "render f.gltf -o new.png --dump-rays set --size 8x8 --spp 1",
+                "--dump-rays would replace a file of the scene",
+            ),
+            (
+                "render f.gltf -o t.####.png --size 8x8 --preset fast --frames 0..3",
+                "t.0001.png: -o would replace a file",
+            ),
             ("render f.gltf -o t.####.png --size 8x8 --spp 1 --frames 0..3", "t.0001.png: -o would replace a file"),
             (
                 "render i.gltf -o a.png --size 8x8 --spp 4 --intervals",
                 "an intermediate image would replace a file of the scene",
             ),
-            ("compare --scene s.gltf --a ao --b ao-sky --size 8x8 --difference t.png", "--difference would replace a file"),
+            (
+                "compare --scene s.gltf --a ao --b ao-sky --size 8x8 --difference t.png",
+                "--difference would replace a file",
+            ),
             ("compare ao-vs-path v.gltf --size 8x8 --plot points.svg", "--plot would replace a file of the scene"),
             ("bench rays s.gltf --quick --csv buffer.bin", "--csv would replace a file of the scene"),
             ("bench frames v.gltf --quick --plot points.svg", "--plot would replace a file of the scene"),
@@ -243,8 +265,14 @@ fn comparisons_and_benchmarks_keep_what_they_read() {
             ("compare a.exr b.exr --difference d.png --flip ./d.png", "two outputs would be one file"),
             ("compare a.exr b.exr --html sub --csv sub/index.html", "two outputs would be one file"),
             ("compare t.png b.png link.png --difference b.png --csv b.a.png", "two outputs would be one file"),
-            ("compare a.exr --scene builtin:plane --b ao --c ao-sky --save . --csv b.exr", "two outputs would be one file"),
-            ("compare b.exr --scene builtin:plane --a ao --reference A --save . --csv a.exr", "two outputs would be one file"),
+            (
+                "compare a.exr --scene builtin:plane --b ao --c ao-sky --save . --csv b.exr",
+                "two outputs would be one file",
+            ),
+            (
+                "compare b.exr --scene builtin:plane --a ao --reference A --save . --csv a.exr",
+                "two outputs would be one file",
+            ),
             ("compare a.exr --scene builtin:plane --a ao --save .", "a.exr: --save would replace image B"),
             ("compare ao-vs-path s.gltf --output x.exr --plot x.exr", "two outputs would be one file"),
             ("compare ao-vs-path s.gltf --environment t.png --plot t.png", "--plot would replace --environment"),
@@ -328,7 +356,10 @@ fn gpu_golden_images_stay_in_their_folder() {
     let manifest = fs::read_to_string(at("frames.toml")).unwrap();
     fs::write(at("frames.toml"), manifest.replace("\"a\"", "\"t\"\ngolden = \"png\"")).unwrap();
     refused("--bless", "would replace an environment");
-    fs::write(at("frames.toml"), manifest.replace("\"a\"", "\"t\"\ngolden = \"png\"").replace(" --environment t.png", ""))
-        .unwrap();
+    fs::write(
+        at("frames.toml"),
+        manifest.replace("\"a\"", "\"t\"\ngolden = \"png\"").replace(" --environment t.png", ""),
+    )
+    .unwrap();
     refused("--bless", "would replace a file of the scene");
 }

@@ -10,7 +10,8 @@ fn gpu_frames_of_light_have_colours() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| place(&dir, name);
     let (exr, apng) = (at("a.##.exr"), at("a.apng"));
-    let base = ["render", "builtin:cornell-box", "--integrator", "path", "--size", "64x48", "--frames", "0..2", "--json"];
+    let base =
+        ["render", "builtin:cornell-box", "--integrator", "path", "--size", "64x48", "--frames", "0..2", "--json"];
     let extra = ["--preset", "fast", "--tone-map", "agx", "--validation", "--no-config", "-o", &exr, "-o", &apng];
     let record = json(&run(&[&base[..], &extra].concat()));
     assert_eq!(record["integrator"], "path");
@@ -32,7 +33,8 @@ fn gpu_stills_of_a_time_line_go_on_after_an_end() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| place(&dir, name);
     let (exr, png) = (at("a.#.exr"), at("a.#.png"));
-    let base = ["render", "builtin:parade", "--integrator", "direct", "--size", "48x27", "--frames", "3..6", "--animate"];
+    let base =
+        ["render", "builtin:parade", "--integrator", "direct", "--size", "48x27", "--frames", "3..6", "--animate"];
     let extra = ["--fps", "10", "--spp", "2", "--json", "--no-config", "-o", &exr, "-o", &png];
     let args = [&base[..], &extra].concat();
     let numbers = |record: &serde_json::Value| -> Vec<u64> {

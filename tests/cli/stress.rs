@@ -53,6 +53,9 @@ fn gpu_a_scene_is_examined() {
     );
     assert!(std::fs::read_to_string(page.join("index.html")).unwrap().contains("hits against the f64 oracle"));
     let text = String::from_utf8(run(&["stress", "builtin:plane", "--tracer", "compute"]).stdout).unwrap();
-    assert!(text.contains("figure cpu      open edges: 4 edges; 4 open edges: AO leaks there by construction"), "{text}");
+    assert!(
+        text.contains("figure cpu      open edges: 4 edges; 4 open edges: AO leaks there by construction"),
+        "{text}"
+    );
     assert_eq!(run(&["stress", "builtin:plane", "--tracer", "compute", "--quiet"]).stdout, b"");
 }

@@ -147,7 +147,11 @@ pub fn assert_interruptions_leave_histories(
             [first, frames.result().unwrap()].map(|image| image.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
         });
         assert!(images[0][0] != images[0][1], "nothing moves");
-        assert!(images[0] == images[1], "{}: interrupted at launch {at} of {launches}, frames in motion differ", tracer.kind());
+        assert!(
+            images[0] == images[1],
+            "{}: interrupted at launch {at} of {launches}, frames in motion differ",
+            tracer.kind()
+        );
     }
     launches
 }

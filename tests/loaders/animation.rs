@@ -15,7 +15,14 @@ use crate::build::*;
 const H: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
 /// Adds a channel to animation 0, which is made when it is not there.
-fn animate<const N: usize>(doc: &mut Doc, node: usize, path: &str, interpolation: &str, times: &[f32], values: &[[f32; N]]) {
+fn animate<const N: usize>(
+    doc: &mut Doc,
+    node: usize,
+    path: &str,
+    interpolation: &str,
+    times: &[f32],
+    values: &[[f32; N]],
+) {
     let input = doc.accessor(&bytes(&times.iter().map(|t| [*t]).collect::<Vec<_>>()), F32, "SCALAR", times.len());
     let output = doc.accessor(&bytes(values), F32, ["SCALAR", "", "VEC3", "VEC4"][N - 1], values.len());
     if doc.json["animations"].is_null() {
@@ -391,7 +398,9 @@ fn triangles_that_open_up_are_kept() {
     up[1] = [0.0, 1.0, 0.0];
     let up = doc.positions(&up);
     let indices = doc.accessor(&[0, 1, 2, 3, 4, 5, 0, 0, 4, 0, 3, 5], U8, "SCALAR", 12);
-    doc.primitive(json!({ "attributes": { "POSITION": position }, "indices": indices, "targets": [{ "POSITION": up }] }));
+    doc.primitive(
+        json!({ "attributes": { "POSITION": position }, "indices": indices, "targets": [{ "POSITION": up }] }),
+    );
     animate(&mut doc, 0, "weights", "LINEAR", &[0.0, 1.0], &[[0.0], [1.0]]);
     let scene = doc.load();
     assert_eq!((scene.triangle_count(), scene.report.degenerate_triangles), (2, 2));
@@ -517,7 +526,10 @@ fn keys_of_careless_exporters_are_played() {
     assert_eq!(at(&playing(&[2.0, 1.0], &[[3.0; 3], [1.0; 3]]), 1.5, "not in the order"), Some(2.0));
     let three = [[0.0; 3], [9.0; 3], [2.0; 3]];
     assert_eq!(at(&playing(&[0.0, f32::NAN, 2.0], &three), 1.0, "1 keys have a time"), Some(1.0));
-    assert_eq!(at(&playing(&[0.0, 1.0, 2.0], &[two[0], [f32::NAN; 3], [2.0; 3]]), 1.0, "not finite: left out"), Some(1.0));
+    assert_eq!(
+        at(&playing(&[0.0, 1.0, 2.0], &[two[0], [f32::NAN; 3], [2.0; 3]]), 1.0, "not finite: left out"),
+        Some(1.0)
+    );
     // the matrix of a node that is animated is one of a translation, a rotation and a scale
     let mut doc = playing(&[0.0, 1.0], &two);
     doc.json["nodes"][0]["matrix"] = json!([0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 7, 0, 0, 1]);
@@ -594,7 +606,10 @@ fn models_of_other_scenes_stand_still() {
 fn same_animations(a: &Scene, b: &Scene) {
     let (x, y) = (rig(a), rig(b));
     assert_eq!(x.animations().len(), y.animations().len());
-    assert_eq!((a.instances.len(), a.meshes.len(), a.cameras.len()), (b.instances.len(), b.meshes.len(), b.cameras.len()));
+    assert_eq!(
+        (a.instances.len(), a.meshes.len(), a.cameras.len()),
+        (b.instances.len(), b.meshes.len(), b.cameras.len())
+    );
     for (p, q) in a.instances.iter().zip(&b.instances) {
         assert_eq!((&p.name, p.mesh, p.object_to_world), (&q.name, q.mesh, q.object_to_world));
     }
@@ -626,7 +641,10 @@ fn animations_round_trip() {
     rich.first()["targets"] = json!([{ "POSITION": up }, {}]);
     let other = rich.first().clone();
     rich.primitive(other);
-    rich.push("nodes", json!({ "name": "group", "children": [4, 5, 6], "matrix": [2,0,0,0, 0,2,0,0, 0,0,2,0, 1,2,3,1] }));
+    rich.push(
+        "nodes",
+        json!({ "name": "group", "children": [4, 5, 6], "matrix": [2,0,0,0, 0,2,0,0, 0,0,2,0, 1,2,3,1] }),
+    );
     rich.push("nodes", json!({ "name": "still", "mesh": 1, "rotation": [0.1, 0.2, 0.3, 0.927] }));
     rich.push("nodes", json!({ "name": "moving", "mesh": 1, "camera": 0 }));
     rich.push("nodes", json!({ "name": "still too", "mesh": 1, "children": [7] }));
@@ -638,7 +656,14 @@ fn animations_round_trip() {
     rich.json["nodes"][0]["weights"] = json!([0.5, 0]);
     animate(&mut rich, 0, "weights", "LINEAR", &[0.0, 1.0], &[[0.0], [0.0], [1.0], [0.3]]);
     animate(&mut rich, 5, "translation", "STEP", &[0.0, 1.0], &[[0.1, 0.2, 0.3], [1.0; 3]]);
-    animate(&mut rich, 7, "scale", "CUBICSPLINE", &[0.0, 1.0], &[[0.0; 3], [0.0; 3], [0.0; 3], [1.0; 3], [0.5; 3], [0.0; 3]]);
+    animate(
+        &mut rich,
+        7,
+        "scale",
+        "CUBICSPLINE",
+        &[0.0, 1.0],
+        &[[0.0; 3], [0.0; 3], [0.0; 3], [1.0; 3], [0.5; 3], [0.0; 3]],
+    );
     animate(&mut rich, 2, "rotation", "LINEAR", &[0.0, 1.0], &[NO_TURN, quarter(0.0, 0.0, 1.0)]);
     // a channel of which nothing will be left says how long it lasts
     rich.push("nodes", json!({ "name": "nothing" }));

@@ -124,8 +124,7 @@ fn errors_name_the_line() {
 fn far_from_the_origin() {
     let folder = Folder::new();
     folder.write("m.obj", OBJ);
-    let text =
-        "Sphere center[448262.387 35.5 -5411932.75] radius[0.1]\rModel file[M.obj] translate[448262.387 35.5 -5411932.75]\r";
+    let text = "Sphere center[448262.387 35.5 -5411932.75] radius[0.1]\rModel file[M.obj] translate[448262.387 35.5 -5411932.75]\r";
     let scene = folder.load("a.brhan", format!("\u{feff}{text}")).unwrap();
     let place = DVec3::new(448_262.387, 35.5, -5_411_932.75);
     for instance in &scene.instances {

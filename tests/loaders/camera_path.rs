@@ -44,7 +44,8 @@ fn keys_are_met_and_the_ends_hold() {
         }
         let (first, last) = path.range();
         assert_eq!((first, last, path.fps()), (-3.0, 55.0, 30.0));
-        for (frame, end) in [(-1e9, first), (f64::NEG_INFINITY, first), (f64::NAN, first), (56.0, last), (1e300, last)] {
+        for (frame, end) in [(-1e9, first), (f64::NEG_INFINITY, first), (f64::NAN, first), (56.0, last), (1e300, last)]
+        {
             assert_eq!(path.camera_at(frame), path.camera_at(end), "{frame}");
         }
         // a single key is a camera that stands
@@ -74,11 +75,13 @@ fn cuts_are_no_motion() {
             assert_eq!(path.key_at(key.frame), *key);
         }
         assert_eq!(path.camera_at(12.499), path.camera_at(10.0));
-        let shots = [&cut_keys[..2], &cut_keys[2..]].map(|keys| CameraPath::new(keys.to_vec(), interpolation, 30.0).unwrap());
+        let shots =
+            [&cut_keys[..2], &cut_keys[2..]].map(|keys| CameraPath::new(keys.to_vec(), interpolation, 30.0).unwrap());
         for (frame, shot) in [(-1.0, 0), (9.0, 0), (12.0, 0), (12.5, 1), (50.0, 1), (60.0, 1)] {
             assert_eq!(path.camera_at(frame), shots[shot].camera_at(frame), "frame {frame}");
         }
-        let between = [(12.0, 13.0), (12.0, 12.5), (12.5, 13.0), (11.0, 12.0), (0.0, 60.0)].map(|(a, b)| path.has_cut(a, b));
+        let between =
+            [(12.0, 13.0), (12.0, 12.5), (12.5, 13.0), (11.0, 12.0), (0.0, 60.0)].map(|(a, b)| path.has_cut(a, b));
         assert_eq!(between, [true, true, false, false, true]);
         assert!(!self::path(interpolation).has_cut(f64::NEG_INFINITY, f64::INFINITY));
         // nothing precedes the first key
@@ -127,8 +130,11 @@ fn smooth_never_overshoots() {
 
 #[test]
 fn orbits() {
-    let camera =
-        Camera { name: "a".into(), aspect: Some(1.5), ..Camera::look_at(DVec3::new(3.0, 2.0, 1.0), DVec3::ONE, DVec3::Y, 0.7) };
+    let camera = Camera {
+        name: "a".into(),
+        aspect: Some(1.5),
+        ..Camera::look_at(DVec3::new(3.0, 2.0, 1.0), DVec3::ONE, DVec3::Y, 0.7)
+    };
     let around = DVec3::new(1.0, 0.0, 0.5);
     let orbit = Orbit::vertical(around, 36.0).unwrap();
     for frame in [0.0, 36.0, -36.0, 360.0] {
@@ -185,13 +191,15 @@ fn files() {
     let path = load(text).unwrap();
     assert_eq!((path.fps(), path.interpolation(), path.range()), (24.0, Interpolation::Linear, (0.0, 60.5)));
     let up = DVec3::Z;
-    let first = Key { frame: 0.0, eye: DVec3::new(0.0, 1.6, 4.0), target: DVec3::Y, up, fov_y: 60f64.to_radians(), cut: false };
+    let first =
+        Key { frame: 0.0, eye: DVec3::new(0.0, 1.6, 4.0), target: DVec3::Y, up, fov_y: 60f64.to_radians(), cut: false };
     assert_eq!(path.keys()[0], first);
     assert_eq!((path.keys()[1].up, path.keys()[1].fov_y), (DVec3::Y, 45f64.to_radians()));
     let cut = r#"{"keys": [{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0]},
         {"frame": 1, "eye": [1, 0, 0], "target": [0, 0, 0], "cut": true}]}"#;
     assert_eq!(load(cut).unwrap().keys().iter().map(|k| k.cut).collect::<Vec<_>>(), [false, true]);
-    let defaults = load(r#"{"keys": [{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 179}]}"#).unwrap();
+    let defaults =
+        load(r#"{"keys": [{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 179}]}"#).unwrap();
     assert_eq!((defaults.fps(), defaults.interpolation()), (30.0, Interpolation::Smooth));
 
     let key = r#"{"frame": 0, "eye": [0, 0, 1], "target": [0, 0, 0]}"#;
@@ -214,13 +222,19 @@ fn files() {
         (&second(r#""frame": 1, "eye": [0, 0, 1e200], "target": [0, 0, 0]"#), "key 2: contains a number"),
         (&second(r#""frame": 1, "eye": [0, 5, 0], "target": [0, 0, 0]"#), "key 2: up lies along the view"),
         (&second(r#""frame": 1, "eye": [0, 5, 0], "target": [0, 0, 0], "up": [0, 0, 0]"#), "key 2: up has no length"),
-        (&second(r#""frame": 1, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 180"#), "between 0.001 and 179"),
+        (
+            &second(r#""frame": 1, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 180"#),
+            "between 0.001 and 179",
+        ),
     ];
     for (text, said) in broken {
         let error = load(text).unwrap_err();
         let message = error.to_string();
         assert_eq!(error.exit_code(), 3, "{message}");
-        assert!(message.contains("path.json: ") && message.contains(said) && !message.contains('\n'), "{text}: {message}");
+        assert!(
+            message.contains("path.json: ") && message.contains(said) && !message.contains('\n'),
+            "{text}: {message}"
+        );
     }
     let none = load_camera_path(&dir.path().join("none.json")).unwrap_err();
     assert!(none.exit_code() == 3 && none.to_string().contains("no such file"));

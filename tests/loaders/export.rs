@@ -28,8 +28,14 @@ fn two_triangles() -> TriangleMesh {
 /// A scene with everything that glTF has words for.
 fn scene() -> Scene {
     let rgba8: TexelData = (0..4 * 8 * 4).map(|i| (i * 7) as u8).collect::<Vec<u8>>().into();
-    let texture =
-        |name: &str, wrap, filter| Texture { name: name.into(), width: 8, height: 4, texels: rgba8.clone(), wrap, filter };
+    let texture = |name: &str, wrap, filter| Texture {
+        name: name.into(),
+        width: 8,
+        height: 4,
+        texels: rgba8.clone(),
+        wrap,
+        filter,
+    };
     let turned = TextureSlot {
         texture: 1,
         texcoord: 1,
@@ -63,7 +69,12 @@ fn scene() -> Scene {
             normal_texture: slot(0),
             normal_scale: 0.7,
         },
-        sheen: Sheen { color: Vec3::new(0.1, 0.2, 0.3), color_texture: slot(0), roughness: 0.4, roughness_texture: slot(1) },
+        sheen: Sheen {
+            color: Vec3::new(0.1, 0.2, 0.3),
+            color_texture: slot(0),
+            roughness: 0.4,
+            roughness_texture: slot(1),
+        },
         transmission: Transmission {
             factor: 0.9,
             texture: slot(0),
@@ -76,7 +87,11 @@ fn scene() -> Scene {
         anisotropy: Anisotropy { strength: 0.5, rotation: 0.1, texture: slot(0) },
         ..Material::default()
     };
-    let mesh = |name: &str, material, triangles| Mesh { name: name.into(), geometry: Geometry::Triangles(triangles), material };
+    let mesh = |name: &str, material, triangles| Mesh {
+        name: name.into(),
+        geometry: Geometry::Triangles(triangles),
+        material,
+    };
     let bare = TriangleMesh { positions: two_triangles().positions, indices: vec![[0, 2, 1]], ..Default::default() };
     let far = DAffine3::from_scale_rotation_translation(
         DVec3::new(-1.0, 2.0, 0.1),
@@ -152,7 +167,10 @@ fn same(a: &Scene, b: &Scene) {
     assert_eq!((a.materials.len(), a.textures.len()), (b.materials.len(), b.textures.len()));
     assert_eq!((a.lights.len(), a.cameras.len()), (b.lights.len(), b.cameras.len()));
     for (x, y) in a.lights.iter().zip(&b.lights) {
-        assert_eq!((&x.name, x.kind, x.intensity, x.position, x.range), (&y.name, y.kind, y.intensity, y.position, y.range));
+        assert_eq!(
+            (&x.name, x.kind, x.intensity, x.position, x.range),
+            (&y.name, y.kind, y.intensity, y.position, y.range)
+        );
         assert!((x.direction - y.direction).length() < 1e-12);
     }
     for (x, y) in a.cameras.iter().zip(&b.cameras) {
@@ -228,7 +246,11 @@ fn spheres_are_tessellated() {
         ],
         instances: vec![
             Instance { name: "ball".into(), mesh: 0, object_to_world: DAffine3::from_scale(DVec3::splat(2.0)) },
-            Instance { name: "bulb".into(), mesh: 1, object_to_world: DAffine3::from_translation(DVec3::new(0.0, 9.0, 0.0)) },
+            Instance {
+                name: "bulb".into(),
+                mesh: 1,
+                object_to_world: DAffine3::from_translation(DVec3::new(0.0, 9.0, 0.0)),
+            },
         ],
         materials: vec![Material::default(), Material { emissive: Vec3::new(10.0, 5.0, 1.0), ..Material::default() }],
         ..Scene::default()
@@ -243,7 +265,8 @@ fn spheres_are_tessellated() {
     let ball = |p: &Vec3| (p.distance(Vec3::new(2.0, 0.0, 0.0)) - 4.0).abs() < 1e-5;
     let bulb = |p: &Vec3| (p.distance(Vec3::new(0.0, 9.0, 0.0)) - 0.5).abs() < 1e-5;
     assert!(
-        positions.iter().all(|p| ball(p) || bulb(p)) && positions.iter().filter(|p| bulb(p)).count() * 2 == positions.len()
+        positions.iter().all(|p| ball(p) || bulb(p))
+            && positions.iter().filter(|p| bulb(p)).count() * 2 == positions.len()
     );
 }
 

@@ -153,11 +153,13 @@ fn compressed_files_are_refused_by_the_extension() {
     // not said to be required, and there is nothing without it
     let mut doc = Doc::triangle();
     doc.json["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
-    doc.json["buffers"] = json!([{ "byteLength": 36, "extensions": { "EXT_meshopt_compression": { "fallback": true } } }]);
+    doc.json["buffers"] =
+        json!([{ "byteLength": 36, "extensions": { "EXT_meshopt_compression": { "fallback": true } } }]);
     assert!(doc.error().contains("the extension EXT_meshopt_compression fills it"), "{}", doc.error());
     let mut doc = Doc::triangle();
     doc.json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
-    doc.first()["extensions"] = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
+    doc.first()["extensions"] =
+        json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
     assert!(doc.error().contains("the extension KHR_draco_mesh_compression fills it"), "{}", doc.error());
     // with data of its own it is read
     doc.json["accessors"][0]["bufferView"] = json!(0);
@@ -200,7 +202,8 @@ fn occlusion_textures_have_a_strength() {
 fn grid(coordinates: impl Fn(Vec2) -> Vec2, material: &Value) -> Doc {
     const SIDE: usize = 5;
     let mut doc = Doc::new();
-    let (mut positions, mut normals, mut texcoords, mut indices) = (Vec::new(), Vec::new(), Vec::new(), Vec::<u8>::new());
+    let (mut positions, mut normals, mut texcoords, mut indices) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::<u8>::new());
     for k in 0..SIDE * SIDE {
         let (x, y) = ((k % SIDE) as f32, (k / SIDE) as f32);
         positions.push([x, y, (x * 1.3).sin() + (y * 0.7).cos()]);
@@ -267,7 +270,10 @@ fn tangents_follow_texture_transforms() {
             for ((p, t), (q, u)) in a.iter().zip(&b) {
                 assert!(p == q && t.w == u.w && t.distance(*u) < 1e-4, "{transform}: {t} {u}");
             }
-            assert!(a.iter().zip(tangents(&plain)).any(|(a, b)| a.1.distance(b.1) > 0.3), "{transform} changes nothing");
+            assert!(
+                a.iter().zip(tangents(&plain)).any(|(a, b)| a.1.distance(b.1) > 0.3),
+                "{transform} changes nothing"
+            );
         }
     }
 }
@@ -276,7 +282,8 @@ fn tangents_follow_texture_transforms() {
 #[test]
 fn textures_of_a_material_have_tangents_of_their_own() {
     let turned = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "rotation": 0.9 } } });
-    let scaled = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [3, 7], "offset": [0.5, 0] } } });
+    let scaled =
+        json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [3, 7], "offset": [0.5, 0] } } });
     let material = |clearcoat: &Value, anisotropy: &Value| {
         json!({ "normalTexture": { "index": 0 }, "extensions": {
             "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatNormalTexture": clearcoat },
@@ -306,7 +313,8 @@ fn textures_of_a_material_have_tangents_of_their_own() {
     // other coordinates: those of the second set lie as the turned ones
     let other = grid(|uv| uv, &material(&json!({ "index": 0, "texCoord": 1 }), &plain));
     let mut doc = other;
-    let affine = grid(|uv| uv, &json!({ "normalTexture": turned })).load().materials[0].normal_texture.unwrap().transform;
+    let affine =
+        grid(|uv| uv, &json!({ "normalTexture": turned })).load().materials[0].normal_texture.unwrap().transform;
     let texcoord = grid(|uv| affine.transform_point2(uv), &plain);
     let at = texcoord.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"].as_u64().unwrap() as usize;
     let view = texcoord.json["accessors"][at]["bufferView"].as_u64().unwrap() as usize;

@@ -170,8 +170,10 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
     match target {
         "gltf" => vec![rich().gltf(), Doc::triangle().gltf()],
         "glb" => vec![rich().glb(), Doc::triangle().glb()],
-        "obj" => texts(&["mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl m\n\
-            f 1/1/1 2/2/1 3/1/1 4/2/1\nf -1 -2 -3\nf 1//1 2//1 3//1\n"]),
+        "obj" => texts(&[
+            "mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl m\n\
+            f 1/1/1 2/2/1 3/1/1 4/2/1\nf -1 -2 -3\nf 1//1 2//1 3//1\n",
+        ]),
         "mtl" => texts(&[
             "newmtl m\nKd 1 1 1\nKs 0 0 0\nNs 10\nd 0.5\nillum 2\nmap_Kd -s 1 2 -o 1 -clamp on t.png\nmap_d t.png\n",
             "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nPr 0.5\nPm 1\nNi 1.5\nTf 1 1 1\n",
@@ -194,11 +196,18 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
                 exr(channels, [8, 4], &[("scene", "a.glb")], &ExrOptions { compression, half, grey_as_rgb: false })
             };
             let rgb = || ["R", "G", "B"].map(|name| ramp(name, 32)).to_vec();
-            [Compression::None, Compression::Rle, Compression::Zips, Compression::Zip, Compression::Piz, Compression::Pxr24]
-                .map(|c| of(rgb(), c, false))
-                .into_iter()
-                .chain([Compression::B44, Compression::B44a].map(|c| of(rgb(), c, true)))
-                .collect()
+            [
+                Compression::None,
+                Compression::Rle,
+                Compression::Zips,
+                Compression::Zip,
+                Compression::Piz,
+                Compression::Pxr24,
+            ]
+            .map(|c| of(rgb(), c, false))
+            .into_iter()
+            .chain([Compression::B44, Compression::B44a].map(|c| of(rgb(), c, true)))
+            .collect()
         }
         "png" => vec![
             png_of(png::ColorType::Rgba, png::BitDepth::Eight, &[90; 64]),
@@ -214,7 +223,8 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
         "film" => vec![film()],
         "hierarchy" => vec![skylit::tracer::hierarchy_probes::hierarchy(&targets::hierarchy_scene())],
         "mesh_bin" => vec![{
-            let words = [3_u32, 1].into_iter().chain(TRIANGLE.as_flattened().iter().map(|x| x.to_bits())).chain([0, 1, 2]);
+            let words =
+                [3_u32, 1].into_iter().chain(TRIANGLE.as_flattened().iter().map(|x| x.to_bits())).chain([0, 1, 2]);
             words.flat_map(u32::to_le_bytes).collect()
         }],
         "settings" => texts(&[

@@ -164,15 +164,20 @@ fn quantized_positions_normals_and_texcoords() {
     // i16, padded to 8 bytes
     let data = short(&[0, 0, 0, 0, 100, 0, 0, 0, 0, -100, 0, 0]);
     let view = doc.view(&data, Some(8));
-    let position = doc.push("accessors", json!({ "bufferView": view, "componentType": I16, "type": "VEC3", "count": 3 }));
+    let position =
+        doc.push("accessors", json!({ "bufferView": view, "componentType": I16, "type": "VEC3", "count": 3 }));
     // normalised i8, padded to 4 bytes
     let normals = [0u8, 0, 127, 0, 0, 0, 127, 0, 0, 129, 0, 0];
     let view = doc.view(&normals, Some(4));
-    let normal = doc
-        .push("accessors", json!({ "bufferView": view, "componentType": I8, "normalized": true, "type": "VEC3", "count": 3 }));
+    let normal = doc.push(
+        "accessors",
+        json!({ "bufferView": view, "componentType": I8, "normalized": true, "type": "VEC3", "count": 3 }),
+    );
     let view = doc.view(&[0, 0, 0, 0, 255, 255, 0, 0, 0, 0, 255, 255], Some(4));
-    let texcoord = doc
-        .push("accessors", json!({ "bufferView": view, "componentType": U16, "normalized": true, "type": "VEC2", "count": 3 }));
+    let texcoord = doc.push(
+        "accessors",
+        json!({ "bufferView": view, "componentType": U16, "normalized": true, "type": "VEC2", "count": 3 }),
+    );
     doc.primitive(json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord } }));
     let scene = doc.load();
     let m = mesh(&scene, 0);
@@ -181,7 +186,9 @@ fn quantized_positions_normals_and_texcoords() {
     assert_eq!(m.texcoords[0], [Vec2::ZERO, Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
 
     // normalised u8 and i16 positions
-    for (component, data) in [(U8, vec![0u8, 0, 0, 255, 0, 0, 0, 255, 0]), (I16, short(&[0, 0, 0, 32767, 0, 0, 0, 32767, 0]))] {
+    for (component, data) in
+        [(U8, vec![0u8, 0, 0, 255, 0, 0, 0, 255, 0]), (I16, short(&[0, 0, 0, 32767, 0, 0, 0, 32767, 0]))]
+    {
         let mut doc = Doc::new();
         let position = doc.accessor(&data, component, "VEC3", 3);
         doc.json["accessors"][0]["normalized"] = json!(true);

@@ -101,8 +101,7 @@ fn deep_hierarchies_do_not_overflow_the_stack() {
 #[test]
 fn squashed_instances_are_baked() {
     let mut doc = Doc::triangle();
-    doc.json["nodes"] =
-        json!([{ "mesh": 0, "children": [1, 2] }, { "mesh": 0, "scale": [2, 2, 0] }, { "mesh": 0, "scale": [0, 0, 0] }]);
+    doc.json["nodes"] = json!([{ "mesh": 0, "children": [1, 2] }, { "mesh": 0, "scale": [2, 2, 0] }, { "mesh": 0, "scale": [0, 0, 0] }]);
     let scene = doc.load();
     assert_eq!((scene.meshes.len(), scene.instances.len(), scene.report.degenerate_triangles), (2, 2, 0));
     assert!(scene.report.warnings[0].contains("scaled to nothing"), "{:?}", scene.report.warnings);
@@ -168,7 +167,10 @@ fn punctual_lights() {
     assert_eq!(spot.kind, LightKind::Spot { inner_angle: 0.1, outer_angle: 0.3 });
     // turned by -90 degrees about x: emits downwards
     assert!((spot.direction - DVec3::NEG_Y).length() < 1e-12, "{}", spot.direction);
-    assert_eq!((sun.kind, sun.direction, sun.range), (LightKind::Directional { angle: 0.0 }, DVec3::NEG_Z, f64::INFINITY));
+    assert_eq!(
+        (sun.kind, sun.direction, sun.range),
+        (LightKind::Directional { angle: 0.0 }, DVec3::NEG_Z, f64::INFINITY)
+    );
     assert_eq!(sun.name, "sun");
 }
 

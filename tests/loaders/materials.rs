@@ -98,7 +98,10 @@ fn extensions() {
     assert_eq!((m.clearcoat.factor, m.clearcoat.roughness), (0.5, 0.25));
     assert_eq!((m.sheen.color, m.sheen.roughness), (Vec3::new(0.1, 0.2, 0.3), 0.7));
     assert_eq!((m.transmission.factor, m.transmission.thickness), (0.9, 2.0));
-    assert_eq!((m.transmission.attenuation_distance, m.transmission.attenuation_color), (3.0, Vec3::new(0.5, 1.0, 1.0)));
+    assert_eq!(
+        (m.transmission.attenuation_distance, m.transmission.attenuation_color),
+        (3.0, Vec3::new(0.5, 1.0, 1.0))
+    );
     assert_eq!((m.ior, m.specular.factor, m.specular.color), (1.33, 0.4, Vec3::X));
     assert_eq!((m.anisotropy.strength, m.anisotropy.rotation), (0.6, 0.3));
     assert_eq!((m.emissive, m.unlit), (Vec3::new(8.0, 8.0, 0.0), true));
@@ -138,7 +141,8 @@ fn texture_transform() {
     assert_eq!(s.transform.transform_point2(Vec2::ONE), Vec2::new(2.0, 3.0));
     assert_eq!(s.texcoord, 1);
     // the same on every kind of texture
-    let transform = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [2, 3], "texCoord": 1 } } });
+    let transform =
+        json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [2, 3], "texCoord": 1 } } });
     let doc = with_material(json!({
         "normalTexture": transform, "occlusionTexture": transform, "emissiveTexture": transform,
         "extensions": { "KHR_materials_clearcoat": { "clearcoatTexture": transform, "clearcoatNormalTexture": transform } },
@@ -180,7 +184,9 @@ fn samplers() {
 #[test]
 fn images_keep_their_bits() {
     let mut hdr = std::io::Cursor::new(Vec::new());
-    image::Rgb32FImage::from_pixel(4, 4, image::Rgb([0.25, 8.0, 0.0])).write_to(&mut hdr, image::ImageFormat::Hdr).unwrap();
+    image::Rgb32FImage::from_pixel(4, 4, image::Rgb([0.25, 8.0, 0.0]))
+        .write_to(&mut hdr, image::ImageFormat::Hdr)
+        .unwrap();
     let mut grey = std::io::Cursor::new(Vec::new());
     image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(1, 1, image::Luma([600u16]))
         .write_to(&mut grey, image::ImageFormat::Png)
@@ -206,7 +212,9 @@ fn images_keep_their_bits() {
 #[test]
 fn images_from_everywhere() {
     let mut jpeg = std::io::Cursor::new(Vec::new());
-    image::RgbImage::from_pixel(8, 8, image::Rgb([200, 100, 50])).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    image::RgbImage::from_pixel(8, 8, image::Rgb([200, 100, 50]))
+        .write_to(&mut jpeg, image::ImageFormat::Jpeg)
+        .unwrap();
     let folder = Folder::new();
     folder.write("sub dir/a b.png", png(4, 4, [9, 8, 7, 6]));
     let mut doc = with_material(json!({
@@ -246,14 +254,31 @@ fn missing_and_broken_images_are_left_out() {
 fn numbers_out_of_range() {
     let is_possible = |scene: &Scene, from: &str| {
         for m in &scene.materials {
-            let shares =
-                [m.base_color.truncate(), m.sheen.color, m.transmittance, m.transmission.attenuation_color, m.specular_color];
+            let shares = [
+                m.base_color.truncate(),
+                m.sheen.color,
+                m.transmittance,
+                m.transmission.attenuation_color,
+                m.specular_color,
+            ];
             assert!(shares.iter().all(|c| c.min_element() >= 0.0 && c.max_element() <= 1.0), "{from}: {m:?}");
-            assert!([m.emissive, m.specular.color].iter().all(|c| c.min_element() >= 0.0 && c.is_finite()), "{from}: {m:?}");
-            let shares =
-                [m.metallic, m.roughness, m.clearcoat.factor, m.clearcoat.roughness, m.sheen.roughness, m.specular.factor];
+            assert!(
+                [m.emissive, m.specular.color].iter().all(|c| c.min_element() >= 0.0 && c.is_finite()),
+                "{from}: {m:?}"
+            );
+            let shares = [
+                m.metallic,
+                m.roughness,
+                m.clearcoat.factor,
+                m.clearcoat.roughness,
+                m.sheen.roughness,
+                m.specular.factor,
+            ];
             assert!(shares.iter().chain([&m.anisotropy.strength]).all(|v| (0.0..=1.0).contains(v)), "{from}: {m:?}");
-            assert!(m.normal_scale.is_finite() && m.ior.is_finite() && m.anisotropy.rotation.is_finite(), "{from}: {m:?}");
+            assert!(
+                m.normal_scale.is_finite() && m.ior.is_finite() && m.anisotropy.rotation.is_finite(),
+                "{from}: {m:?}"
+            );
         }
         assert!(scene.lights.iter().all(|l| l.intensity.min_element() >= 0.0), "{from}");
         assert!(

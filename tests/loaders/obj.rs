@@ -13,7 +13,9 @@ fn error(text: &str) -> String {
 /// A triangle with the material `m` of this library.
 fn with_mtl(folder: &Folder, mtl: &str) -> Scene {
     folder.write("a.mtl", mtl);
-    folder.load("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n").unwrap()
+    folder
+        .load("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n")
+        .unwrap()
 }
 
 #[test]
@@ -183,7 +185,12 @@ fn encodings_and_byte_order_marks() {
         ] {
             folder.write("a.mtl", encode(mtl));
             let scene = folder.load("a.obj", encode(&text)).unwrap();
-            assert_eq!((color(&scene), scene.report.warnings.len()), ([1.0, 0.0, 0.0], 0), "{:?}", scene.report.warnings);
+            assert_eq!(
+                (color(&scene), scene.report.warnings.len()),
+                ([1.0, 0.0, 0.0], 0),
+                "{:?}",
+                scene.report.warnings
+            );
         }
     }
 }
@@ -230,9 +237,12 @@ fn lists_of_libraries() {
     assert_eq!(load("mtllib blue.mtl red.mtl", "both"), blue);
     assert_eq!(load("mtllib red.mtl\nmtllib blue.mtl\nmtllib red.mtl", "both"), red);
     assert_eq!(load("mtllib \"red.mtl\"", "red"), red);
-    for list in
-        ["my own lib.mtl", "\"my own lib.mtl\"", "red.mtl my own lib.mtl blue.mtl", "\"red.mtl\" \"my own lib.mtl\" # all"]
-    {
+    for list in [
+        "my own lib.mtl",
+        "\"my own lib.mtl\"",
+        "red.mtl my own lib.mtl blue.mtl",
+        "\"red.mtl\" \"my own lib.mtl\" # all",
+    ] {
         assert_eq!(load(&format!("mtllib {list}"), "green"), green, "{list}");
     }
     assert_eq!(load("mtllib C:\\models\\red.mtl", "red"), red);
@@ -260,8 +270,7 @@ fn a_library_of_the_same_name_needs_no_mention() {
 #[test]
 fn names_of_materials() {
     let folder = Folder::new();
-    let mtl =
-        "newmtl Material #25\nKd 1 0 0\nnewmtl Material #26\nKd 0 1 0\nnewmtl \"a b\"\nKd 0 0 1\nnewmtl x # note\nKd 1 1 0\n";
+    let mtl = "newmtl Material #25\nKd 1 0 0\nnewmtl Material #26\nKd 0 1 0\nnewmtl \"a b\"\nKd 0 0 1\nnewmtl x # note\nKd 1 1 0\n";
     folder.write("a.mtl", mtl);
     let of = |name: &str| {
         let scene = folder.load("a.obj", RED.replace("usemtl red", &format!("usemtl {name}"))).unwrap();
@@ -277,10 +286,15 @@ fn names_of_materials() {
 
 #[test]
 fn numbers_as_programs_write_them() {
-    let text = "v 1.0e+03 -5. .5\nv 1,5 2,25 -0,5\nv 1.0D+1 0 0\nvt nan(ind) -1.#IND\nvn 1.#QNAN 0 0\nf 1/1/1 2/1/1 3/0/0\n";
+    let text =
+        "v 1.0e+03 -5. .5\nv 1,5 2,25 -0,5\nv 1.0D+1 0 0\nvt nan(ind) -1.#IND\nvn 1.#QNAN 0 0\nf 1/1/1 2/1/1 3/0/0\n";
     let scene = Folder::new().load("a.obj", text).unwrap();
     assert_eq!(corners(mesh(&scene, 0)), [[[1000.0, -5.0, 0.5], [1.5, 2.25, -0.5], [10.0, 0.0, 0.0]]]);
-    assert!(scene.report.warnings.iter().any(|w| w.contains("3 numbers have a decimal comma")), "{:?}", scene.report.warnings);
+    assert!(
+        scene.report.warnings.iter().any(|w| w.contains("3 numbers have a decimal comma")),
+        "{:?}",
+        scene.report.warnings
+    );
     assert!(mesh(&scene, 0).normals.iter().all(|n| n.is_normalized()));
     assert!(error("v 1,2,3 0 0\n").contains("`1,2,3` is not a number"));
     assert!(error("v 1.#INF 0 0\n").contains("is not finite"));
@@ -308,8 +322,9 @@ fn far_from_the_origin() {
     assert_eq!(near.instances[0].object_to_world, glam::DAffine3::IDENTITY);
     // the vertex that nothing uses does not count, and meshes that touch have one place
     assert_eq!(far.instances[0].object_to_world, far.instances[1].object_to_world);
-    let place =
-        |scene: &Scene, k: usize| scene.instances[0].object_to_world.transform_point3(mesh(scene, 0).positions[k].as_dvec3());
+    let place = |scene: &Scene, k: usize| {
+        scene.instances[0].object_to_world.transform_point3(mesh(scene, 0).positions[k].as_dvec3())
+    };
     for k in 0..3 {
         let expected = place(&near, k) + glam::DVec3::new(448_262.25, 35.5, -5_411_932.75);
         assert!((place(&far, k) - expected).length() < 1e-6, "{} {expected}", place(&far, k));
@@ -337,7 +352,8 @@ fn smoothing_groups() {
         let scene = Folder::new().load("a.obj", format!("{vertices}{faces}")).unwrap();
         assert!(mesh(&scene, 0).normals.is_empty(), "{faces}");
     }
-    let scene = Folder::new().load("a.obj", format!("{vertices}vn 1 0 0\ns 1\nf 1//1 3//1 5//1\nf 3//1 2//1 5//1\n")).unwrap();
+    let scene =
+        Folder::new().load("a.obj", format!("{vertices}vn 1 0 0\ns 1\nf 1//1 3//1 5//1\nf 3//1 2//1 5//1\n")).unwrap();
     assert!(mesh(&scene, 0).normals.iter().all(|n| *n == Vec3::X));
 }
 
@@ -369,7 +385,12 @@ fn warnings_are_bounded() {
     }
     let scene = folder.load("a.obj", text).unwrap();
     let warnings = &scene.report.warnings;
-    assert!(warnings.len() < 10 && warnings.iter().all(|w| w.len() < 2000), "{} warnings: {:.500?}", warnings.len(), warnings);
+    assert!(
+        warnings.len() < 10 && warnings.iter().all(|w| w.len() < 2000),
+        "{} warnings: {:.500?}",
+        warnings.len(),
+        warnings
+    );
     assert!(warnings.iter().any(|w| w.contains("map_Ks is not used (and 1999 more of this kind)")), "{warnings:?}");
 }
 
@@ -448,7 +469,10 @@ fn opacity_in_its_many_spellings() {
     }
     // what 3ds Max and Maya write of every opaque surface
     for opaque in ["Ni 1.5\nd 1\nTr 0\nTf 1 1 1\nillum 2", "illum 4\nKd 0.5 0.5 0.5\nTf 1.00 1.00 1.00\nNi 1.00"] {
-        assert_eq!((material(opaque).kind, material(opaque).alpha_mode), (MaterialKind::MetallicRoughness, AlphaMode::Opaque));
+        assert_eq!(
+            (material(opaque).kind, material(opaque).alpha_mode),
+            (MaterialKind::MetallicRoughness, AlphaMode::Opaque)
+        );
     }
     assert_eq!(material("Kd 0 0 0\nKs 0.95 0.95 0.95\nillum 5").kind, MaterialKind::Mirror);
     // a library in which all is hidden has d for Tr; one in which something shows has not

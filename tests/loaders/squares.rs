@@ -165,8 +165,12 @@ fn tangents_at_one_position() {
     );
     for k in 0..count {
         let (s, far) = (f64::from(k) / f64::from(count), 1.0 + 1e-4 * f64::from(k));
-        writeln!(apart, "v 0 0 0\nv {far} 0 0\nv 0 {far} 0\nvt {s} 0\nvt {s} 1\nvt {} 0\nf -3/-3/1 -2/-2/1 -1/-1/1", s + 1.0)
-            .unwrap();
+        writeln!(
+            apart,
+            "v 0 0 0\nv {far} 0 0\nv 0 {far} 0\nvt {s} 0\nvt {s} 1\nvt {} 0\nf -3/-3/1 -2/-2/1 -1/-1/1",
+            s + 1.0
+        )
+        .unwrap();
         let (sin, cos) = (std::f64::consts::TAU * s).sin_cos();
         writeln!(ring, "v {cos} {sin} 0\nvt {cos} {sin}").unwrap();
     }

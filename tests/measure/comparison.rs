@@ -8,7 +8,8 @@ use skylit::{Error, Result};
 const SIZE: usize = 16;
 
 fn image(channels: Vec<(&str, Vec<f32>)>) -> Image {
-    let channels = channels.into_iter().map(|(name, v)| Channel { name: name.into(), samples: Samples::F32(v) }).collect();
+    let channels =
+        channels.into_iter().map(|(name, v)| Channel { name: name.into(), samples: Samples::F32(v) }).collect();
     Image { width: SIZE as u32, height: SIZE as u32, channels, metadata: Vec::new() }
 }
 
@@ -53,7 +54,8 @@ fn what_cannot_be_compared_is_refused() {
     (wide.width, wide.height) = (32, 8);
     assert!(matches!(of(&wide, &grey(0.5)), Err(Error::CheckFailed(e)) if e.contains("32x8 and 16x16")));
     let named = |name: &str| {
-        compare(&grey(0.5), &grey(0.5), &CompareOptions { channels: vec![name.into()], ..Default::default() }).unwrap_err()
+        compare(&grey(0.5), &grey(0.5), &CompareOptions { channels: vec![name.into()], ..Default::default() })
+            .unwrap_err()
     };
     assert!(named("Z").to_string().contains("no channel Z of numbers; it has Y"));
     let mut bytes = grey(0.5);
@@ -82,7 +84,8 @@ fn bad_pixels_are_counted_apart() {
 #[test]
 fn outliers_are_what_noise_does_not_explain() {
     // a standard error of 0.1 / sqrt(25) = 0.02 in each image: six of the difference are 0.17
-    let of_samples = |values: Vec<f32>| image(vec![("Y", values), ("variance", filled(0.01)), ("samples", filled(25.0))]);
+    let of_samples =
+        |values: Vec<f32>| image(vec![("Y", values), ("variance", filled(0.01)), ("samples", filled(25.0))]);
     let mut values = filled(0.5);
     (values[7], values[9], values[11]) = (0.66, 0.34, 0.69);
     let c = of(&of_samples(values.clone()), &of_samples(filled(0.5))).unwrap();

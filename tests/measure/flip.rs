@@ -84,7 +84,8 @@ fn grows_with_the_difference_whichever_comes_first() {
     let grain = noise(truth.len(), 5);
     let mut last = 0.0;
     for strength in [0.01, 0.03, 0.1, 0.3] {
-        let noisy: Vec<f32> = truth.iter().zip(&grain).map(|(v, n)| (v + strength * (n - 0.5)).clamp(0.0, 1.0)).collect();
+        let noisy: Vec<f32> =
+            truth.iter().zip(&grain).map(|(v, n)| (v + strength * (n - 0.5)).clamp(0.0, 1.0)).collect();
         let (there, back) = (of(&noisy, &truth, 3, 64).mean, of(&truth, &noisy, 3, 64).mean);
         assert!(there > last * 1.2, "{strength}: {there} after {last}");
         assert!((there - back).abs() < 1e-9, "{there} {back}");
@@ -127,7 +128,8 @@ fn arguments_are_checked() {
 #[test]
 fn agrees_with_the_direct_computation() {
     // more rows than a band, odd sizes, sizes below the reach of the filters
-    for (width, height, ppd) in [(37, 141, PIXELS_PER_DEGREE), (65, 9, PIXELS_PER_DEGREE), (5, 3, 30.0), (40, 30, 20.0)] {
+    for (width, height, ppd) in [(37, 141, PIXELS_PER_DEGREE), (65, 9, PIXELS_PER_DEGREE), (5, 3, 30.0), (40, 30, 20.0)]
+    {
         let a = picture(width, height, 0.04);
         let mut b = picture(width, height, 0.0);
         b.iter_mut().zip(noise(a.len(), 9)).for_each(|(v, n)| *v = (*v + 0.1 * (n - 0.5)).clamp(0.0, 1.0));
@@ -203,8 +205,11 @@ mod direct {
     impl Filter {
         fn new(radius: i64, f: impl Fn(f64, f64) -> f64) -> Self {
             let side = -radius..=radius;
-            let mut weights: Vec<f64> =
-                side.clone().flat_map(|y| side.clone().map(move |x| (x, y))).map(|(x, y)| f(x as f64, y as f64)).collect();
+            let mut weights: Vec<f64> = side
+                .clone()
+                .flat_map(|y| side.clone().map(move |x| (x, y)))
+                .map(|(x, y)| f(x as f64, y as f64))
+                .collect();
             let positive: f64 = weights.iter().filter(|w| **w > 0.0).sum();
             let negative: f64 = weights.iter().filter(|w| **w < 0.0).map(|w| -w).sum();
             weights.iter_mut().for_each(|w| *w /= if *w > 0.0 { positive } else { negative.max(1e-300) });
@@ -271,7 +276,8 @@ mod direct {
             .map(|(a, b)| {
                 let d = hyab(a.lab, b.lab).powf(0.7);
                 let knee = 0.4 * greatest;
-                let colour = if d < knee { 0.95 / knee * d } else { 0.95 + (d - knee) / (greatest - knee) * (1.0 - 0.95) };
+                let colour =
+                    if d < knee { 0.95 / knee * d } else { 0.95 + (d - knee) / (greatest - knee) * (1.0 - 0.95) };
                 let feature = (a.edge - b.edge).abs().max((a.point - b.point).abs());
                 colour.powf(1.0 - (feature / 2f64.sqrt()).sqrt())
             })

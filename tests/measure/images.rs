@@ -50,9 +50,15 @@ mod metrics {
         close(p.bias(), 0.0);
         let all = ImagePair::new(&image, &reference, 3, None).unwrap();
         assert_eq!((all.count(), all.non_finite()), (6, 2));
-        for x in
-            [all.rmse(), all.bias(), all.max_abs_difference(), all.rel_mse(), all.psnr(), all.minimum_ratio(), all.tanimoto()]
-        {
+        for x in [
+            all.rmse(),
+            all.bias(),
+            all.max_abs_difference(),
+            all.rel_mse(),
+            all.psnr(),
+            all.minimum_ratio(),
+            all.tanimoto(),
+        ] {
             assert!(x.is_nan(), "a broken pixel is not averaged away");
         }
         assert!(pair(&[], &[]).rmse().is_nan());
@@ -188,8 +194,13 @@ mod parity {
             let any = judge_any(&o, &rays, &occluded, &o.trace_any(&rays), Rounding::default());
             println!("{name}, any: {any}");
             assert_eq!(any.unexplained, 0, "{name}: {any}");
-            let pair =
-                judge_pair(&o, &rays, &hits, &truth.iter().map(OracleHit::to_hit).collect::<Vec<_>>(), Rounding::default());
+            let pair = judge_pair(
+                &o,
+                &rays,
+                &hits,
+                &truth.iter().map(OracleHit::to_hit).collect::<Vec<_>>(),
+                Rounding::default(),
+            );
             assert_eq!(pair.unexplained, 0, "{name}: {pair}");
         }
     }
@@ -269,7 +280,8 @@ mod parity {
         let s = analytic::parallel_planes(2.0, 2.0, 1.0, SceneTransform::default());
         let o = Oracle::new(&s, DVec3::ZERO);
         let judge = |ray: Ray, hit: Hit| judge_closest_ray(&o, &ray, &hit, &o.closest(ray), Rounding::default());
-        let down = |x: f32, z: f32| Ray { origin: [x, 0.5, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
+        let down =
+            |x: f32, z: f32| Ray { origin: [x, 0.5, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
         let hit = |primitive: u32, t: f32| Hit { t, instance: 0, primitive, u: 0.0, v: 0.0 };
         // outer edge: hit or miss; a little further in or out: not
         assert_eq!(judge(down(1.0, 0.3), Hit::MISS), RayVerdict::Tie);
@@ -297,8 +309,10 @@ mod parity {
             let below = Hit { t: 0.5, instance: 0, primitive: o.closest(ray).primitive, u: 0.0, v: 0.0 };
             // from below the ceiling, which is the upper one: naming the floor passes over it
             let other = OracleHit { instance: 1, ..o.closest(ray) };
-            let floor = (0..2).find(|&p| o.candidates(&OracleRay::from(ray), 0, p, Rounding::default()).any(|c| c.certain));
-            let verdict = judge_closest_ray(&o, &ray, &Hit { primitive: floor.unwrap(), ..below }, &other, Rounding::default());
+            let floor =
+                (0..2).find(|&p| o.candidates(&OracleRay::from(ray), 0, p, Rounding::default()).any(|c| c.certain));
+            let verdict =
+                judge_closest_ray(&o, &ray, &Hit { primitive: floor.unwrap(), ..below }, &other, Rounding::default());
             assert_eq!(verdict == RayVerdict::Tie, tie, "{apart}: {verdict:?}");
         }
         // grazing: in the plane of the floor

@@ -52,7 +52,9 @@ fn metrics_agree_with_other_implementations() {
         ] {
             close(name, found, &answer[name]);
         }
-        for (found, expected) in pair.percentiles([0.5, 0.95, 0.99]).iter().zip(answer["percentiles"].as_array().unwrap()) {
+        for (found, expected) in
+            pair.percentiles([0.5, 0.95, 0.99]).iter().zip(answer["percentiles"].as_array().unwrap())
+        {
             close("percentile", *found, expected);
         }
         if let Some(expected) = answer.get("flip") {

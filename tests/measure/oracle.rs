@@ -29,8 +29,16 @@ fn all_rays(o: &Oracle, s: &Scene, scale: usize) -> Vec<Ray> {
 
 #[test]
 fn bvh_equals_brute_force() {
-    let names =
-        ["cornell-box", "sphere-over-plane", "grid:2", "spheres:300", "leaf-cards", "stairs", "far-away", "v-groove:60"];
+    let names = [
+        "cornell-box",
+        "sphere-over-plane",
+        "grid:2",
+        "spheres:300",
+        "leaf-cards",
+        "stairs",
+        "far-away",
+        "v-groove:60",
+    ];
     for name in names {
         let s = scene(name);
         let o = Oracle::new(&s, s.origin());
@@ -51,9 +59,10 @@ fn bvh_equals_brute_force() {
 #[test]
 fn bvh_equals_brute_force_on_awkward_rays() {
     // along axes, in planes of faces, through vertices, and with origins on surfaces
-    for (name, at) in
-        [("unit", SceneTransform::default()), ("moved", SceneTransform { scale: 1e-3, offset: DVec3::new(1e3, -1e6, 7.0) })]
-    {
+    for (name, at) in [
+        ("unit", SceneTransform::default()),
+        ("moved", SceneTransform { scale: 1e-3, offset: DVec3::new(1e3, -1e6, 7.0) }),
+    ] {
         let s = analytic::closed_box(2.0, at);
         for origin in [DVec3::ZERO, s.origin()] {
             let o = Oracle::new(&s, origin);
@@ -70,8 +79,12 @@ fn bvh_equals_brute_force_on_awkward_rays() {
                             [0.0, 0.0, 1e-30],
                             [1e20, 1.0, 0.0],
                         ] {
-                            let ray =
-                                OracleRay { origin: from, direction: DVec3::from_array(d), tmin: 0.0, tmax: f64::INFINITY };
+                            let ray = OracleRay {
+                                origin: from,
+                                direction: DVec3::from_array(d),
+                                tmin: 0.0,
+                                tmax: f64::INFINITY,
+                            };
                             assert_eq!(o.closest(ray), o.brute_force_closest(ray), "{name}: {ray:?}");
                         }
                     }
@@ -99,7 +112,12 @@ fn closed_meshes_do_not_leak() {
 }
 
 fn ray(origin: [f64; 3], direction: [f64; 3]) -> OracleRay {
-    OracleRay { origin: DVec3::from_array(origin), direction: DVec3::from_array(direction), tmin: 0.0, tmax: f64::INFINITY }
+    OracleRay {
+        origin: DVec3::from_array(origin),
+        direction: DVec3::from_array(direction),
+        tmin: 0.0,
+        tmax: f64::INFINITY,
+    }
 }
 
 #[test]
@@ -157,7 +175,8 @@ fn alpha_masks_cut_holes() {
     });
     let Geometry::Triangles(mesh) = &mut s.meshes[0].geometry else { panic!() };
     mesh.texcoords[0] = mesh.positions.iter().map(|p| glam::Vec2::new(p.x * 0.5 + 0.5, 0.5)).collect();
-    s.materials[0].base_color_texture = Some(TextureSlot { texture: 0, texcoord: 0, transform: glam::Affine2::IDENTITY });
+    s.materials[0].base_color_texture =
+        Some(TextureSlot { texture: 0, texcoord: 0, transform: glam::Affine2::IDENTITY });
     s.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
     let present = |s: &Scene, x: f64| Oracle::new(s, DVec3::ZERO).any(ray([x, 1.0, 0.1], [0.0, -1.0, 0.0]));
     assert!(!present(&s, -0.01) && present(&s, 0.01));
@@ -216,9 +235,17 @@ fn every_builtin_scene_is_sound() {
     assert_eq!(scene("v-groove:60").name, "v-groove:60");
     assert_eq!(scene("spheres:17").sphere_count(), 17);
     assert_eq!(scene("grid:3").instances.len(), 28);
-    for wrong in
-        ["", "cornell", "cornell-box:3", "v-groove:x", "v-groove:0", "v-groove:NaN", "grid:0", "grid:-1", "grid:4000000000"]
-    {
+    for wrong in [
+        "",
+        "cornell",
+        "cornell-box:3",
+        "v-groove:x",
+        "v-groove:0",
+        "v-groove:NaN",
+        "grid:0",
+        "grid:-1",
+        "grid:4000000000",
+    ] {
         assert!(builtin::by_name(wrong).is_none(), "{wrong}");
     }
 }
@@ -286,7 +313,8 @@ mod ao {
 
     #[test]
     fn planes_and_boxes() {
-        let places = [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, 0.2, 0.3)), (1e6, DVec3::ZERO), (1.0, DVec3::splat(1e6))];
+        let places =
+            [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, 0.2, 0.3)), (1e6, DVec3::ZERO), (1.0, DVec3::splat(1e6))];
         for (scale, offset) in places {
             let at = SceneTransform { scale, offset };
             let s = analytic::plane(10.0, at);
@@ -334,7 +362,14 @@ mod ao {
         for c in [1.0, 2.0, 8.0] {
             let s = analytic::sphere_over_plane(1.0, 1.5, 100.0, SceneTransform::default());
             let want = exact::sphere_over_plane_falloff(1.0, 1.5, c).unwrap();
-            check(&format!("sphere, falloff {c}"), &s, DVec3::ZERO, DVec3::Y, AoSettings { falloff: c, ..BINARY }, want);
+            check(
+                &format!("sphere, falloff {c}"),
+                &s,
+                DVec3::ZERO,
+                DVec3::Y,
+                AoSettings { falloff: c, ..BINARY },
+                want,
+            );
         }
         assert_eq!(exact::sphere_over_plane(1.0, 0.5, 2.0), None);
         let (a, b) = (exact::sphere_over_plane(1.0, 2.0, 0.0), exact::sphere_over_plane_falloff(1.0, 2.0, 1.0));

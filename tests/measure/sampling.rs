@@ -64,12 +64,16 @@ fn choices_are_nets_and_evenly_spaced() {
             assert!(is_net(&points), "first 2^{k} choices of {pixel:?}, {dimension}");
             let mut first: Vec<u32> = points.iter().map(|p| p[0]).collect();
             first.sort_unstable();
-            assert!(first.windows(2).all(|w| u64::from(w[1] - w[0]) == 1u64 << (32 - k)), "{pixel:?}, {dimension}: {first:?}");
+            assert!(
+                first.windows(2).all(|w| u64::from(w[1] - w[0]) == 1u64 << (32 - k)),
+                "{pixel:?}, {dimension}: {first:?}"
+            );
         }
     }
     // those of pixels are shifted against each other, uniformly
     let (n, sampler) = (4096, Sampler { seed: 1 });
-    let mean: f64 = (0..n).map(|x| f64::from(to_unit(sampler.get_choice_2d([x, 3], 0, 2)[0]))).sum::<f64>() / f64::from(n);
+    let mean: f64 =
+        (0..n).map(|x| f64::from(to_unit(sampler.get_choice_2d([x, 3], 0, 2)[0]))).sum::<f64>() / f64::from(n);
     assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / f64::from(n)).sqrt(), "{mean}");
 }
 

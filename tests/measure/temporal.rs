@@ -67,8 +67,12 @@ fn residual_under_noise() {
     let runs = 200;
     for seed in 0..runs {
         let noise = normal(truth.len(), seed + 1);
-        let result: Vec<f32> =
-            blend(&truth, &wrong, 0.2).iter().zip(&truth).zip(&noise).map(|((v, t), n)| v + 0.3 * t * *n as f32).collect();
+        let result: Vec<f32> = blend(&truth, &wrong, 0.2)
+            .iter()
+            .zip(&truth)
+            .zip(&noise)
+            .map(|((v, t), n)| v + 0.3 * t * *n as f32)
+            .collect();
         let found = Residual::from_images(&result, &truth, &wrong, None).unwrap();
         assert!((found.share - 0.2).abs() < 5.0 * found.standard_error);
         squares += ((found.share - 0.2) / found.standard_error).powi(2);

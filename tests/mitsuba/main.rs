@@ -162,7 +162,9 @@ impl Entry {
         scene.environment = match &self.environment {
             None => Environment::Black,
             Some(Surroundings::Uniform(c)) => Environment::Uniform(Vec3::from_array(*c)),
-            Some(Surroundings::File(f)) => Environment::Map(load_environment(&folder().join("scenes").join(f)).unwrap()),
+            Some(Surroundings::File(f)) => {
+                Environment::Map(load_environment(&folder().join("scenes").join(f)).unwrap())
+            }
         };
         scene
     }
@@ -307,19 +309,23 @@ fn compare(ours: &Noisy, judge: &Noisy) -> Verdict {
         if z.abs() > threshold {
             let (at, channel) = (tiles[k / 3].first, k % 3);
             let percent = 100.0 * difference / averages[channel].max(1e-12);
-            v.failures.push(format!("tile at {at:?}, channel {channel}: {z:.1} sigmas, {percent:.2} % of the image's mean"));
+            v.failures
+                .push(format!("tile at {at:?}, channel {channel}: {z:.1} sigmas, {percent:.2} % of the image's mean"));
         }
     }
     v.tile_rms = (squares / (3 * tiles.len()) as f64).sqrt();
 
-    for (c, [z, difference, error]) in over(ours, judge, &[Region::whole(known.size)], &rounding).into_iter().enumerate() {
+    for (c, [z, difference, error]) in
+        over(ours, judge, &[Region::whole(known.size)], &rounding).into_iter().enumerate()
+    {
         let (precision, average) = (error / averages[c], averages[c]);
         if z.abs() >= v.mean_z.abs() {
             (v.mean_z, v.difference) = (z, difference / average);
         }
         v.precision = v.precision.max(precision);
         if z.abs() > MEAN_SIGMAS {
-            v.failures.push(format!("channel {c}: the mean is off by {z:.1} sigmas, {:.2} %", 100.0 * difference / average));
+            v.failures
+                .push(format!("channel {c}: the mean is off by {z:.1} sigmas, {:.2} %", 100.0 * difference / average));
         }
         // a channel that is black says nothing, and would divide by nothing
         if precision.is_nan() || precision > PRECISION {
@@ -379,8 +385,9 @@ fn agrees(kind: TracerKind) {
         );
         let more = v.failures.len().saturating_sub(MAX_FAILURES);
         // means and tiles come after pixels, and say more
-        failures
-            .extend(v.failures.into_iter().rev().take(MAX_FAILURES).map(|f| format!("{} ({}): {f}", entry.name, entry.about)));
+        failures.extend(
+            v.failures.into_iter().rev().take(MAX_FAILURES).map(|f| format!("{} ({}): {f}", entry.name, entry.about)),
+        );
         if more > 0 {
             failures.push(format!("{}: and {more} more", entry.name));
         }
@@ -447,8 +454,13 @@ fn comparison_detects_wrong_images() {
         let variance: Vec<f64> = (0..3 * n).map(|k| sd(k).powi(2)).collect();
         let mean = (0..3 * n).map(|k| wrong(k) + sd(k) * normal()).collect();
         let samples = vec![spp; n];
-        let estimate =
-            Estimate { size: [32, 32], channels: 3, mean, variance: variance.iter().map(|v| v * spp).collect(), samples };
+        let estimate = Estimate {
+            size: [32, 32],
+            channels: 3,
+            mean,
+            variance: variance.iter().map(|v| v * spp).collect(),
+            samples,
+        };
         Noisy { estimate, by_blocks: variance, freedom: 64.0 }
     };
     let judge = image(judge_spp, &|k| truth[k]);

@@ -127,7 +127,9 @@ fn a_device_that_is_full() {
 
 #[test]
 fn delays_are_simple_fractions() {
-    for (rate, want) in [(30.0, (1, 30)), (29.97, (100, 2997)), (23.976, (125, 2997)), (0.5, (2, 1)), (1000.0, (1, 1000))] {
+    for (rate, want) in
+        [(30.0, (1, 30)), (29.97, (100, 2997)), (23.976, (125, 2997)), (0.5, (2, 1)), (1000.0, (1, 1000))]
+    {
         let delay = Delay::of_rate(rate).unwrap();
         assert_eq!((delay.numerator, delay.denominator), want, "{rate}");
     }
@@ -163,7 +165,10 @@ fn frame_numbers() {
     assert!(matches!(&error, Error::Usage(m) if m.contains("a.##.b.#.exr") && m.contains("one run of #")), "{error}");
     assert_eq!(error.exit_code(), 64);
     let pattern = FramePattern::from_path(Path::new("x.###.png")).unwrap().unwrap();
-    assert_eq!([8, 9, 10].map(|k| pattern.path(k)), ["x.008.png", "x.009.png", "x.010.png"].map(std::path::PathBuf::from));
+    assert_eq!(
+        [8, 9, 10].map(|k| pattern.path(k)),
+        ["x.008.png", "x.009.png", "x.010.png"].map(std::path::PathBuf::from)
+    );
 }
 
 #[cfg(unix)]

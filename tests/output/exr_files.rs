@@ -5,8 +5,8 @@ use std::path::Path;
 use exr::math::Vec2;
 use exr::meta::attribute::IntegerBounds;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder, ReadChannels,
-    ReadLayers, WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder,
+    ReadChannels, ReadLayers, WritableImage, f16,
 };
 use skylit::output::exr::{ExrOptions, WORLD_TO_CAMERA, WORLD_TO_NDC, is_half, write, write_with};
 use skylit::output::settings::ExrCompression;
@@ -118,7 +118,8 @@ fn compression_is_lossless_unless_it_says_otherwise() {
                         continue;
                     };
                     let is_half = half && is_half(&a.name);
-                    let of_half = |v: f32| if v.is_finite() { f16::from_f32(v.clamp(-65504.0, 65504.0)).to_f32() } else { v };
+                    let of_half =
+                        |v: f32| if v.is_finite() { f16::from_f32(v.clamp(-65504.0, 65504.0)).to_f32() } else { v };
                     for (exact, value) in exact.iter().map(|v| if is_half { of_half(*v) } else { *v }).zip(values) {
                         let same = exact.to_bits() == value.to_bits();
                         let within = |relative: f32| (exact - value).abs() <= relative * exact.abs();
@@ -137,7 +138,10 @@ fn compression_is_lossless_unless_it_says_otherwise() {
         })
         .collect();
     let size = |c: ExrCompression| sizes[ExrCompression::ALL.iter().position(|x| *x == c).unwrap()];
-    assert!(size(ExrCompression::Zip) < size(ExrCompression::None) && size(ExrCompression::Pxr24) < size(ExrCompression::Zip));
+    assert!(
+        size(ExrCompression::Zip) < size(ExrCompression::None)
+            && size(ExrCompression::Pxr24) < size(ExrCompression::Zip)
+    );
 }
 
 #[test]
@@ -290,7 +294,8 @@ fn files_that_end_early_say_so() {
     for name in ["a.exr", "a.png", "a.jpg", "a.webp"] {
         let path = dir.path().join(name);
         let image = sample();
-        output::save(&Image { channels: vec![f32s("Y", image.f32("albedo.R").unwrap().to_vec())], ..image }, &path).unwrap();
+        output::save(&Image { channels: vec![f32s("Y", image.f32("albedo.R").unwrap().to_vec())], ..image }, &path)
+            .unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         let error = output::load(&path).unwrap_err().to_string();

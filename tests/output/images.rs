@@ -27,7 +27,10 @@ fn sample(width: u32, height: u32) -> Image {
             f32s("G", wave(1)),
             f32s("R", wave(0)),
             f32s("depth.Z", depth),
-            Channel { name: "id.instance".into(), samples: Samples::U32((0..n as u32).map(|i| u32::MAX - i).collect()) },
+            Channel {
+                name: "id.instance".into(),
+                samples: Samples::U32((0..n as u32).map(|i| u32::MAX - i).collect()),
+            },
         ],
         metadata: vec![
             ("device".into(), "llvmpipe (LLVM 15.0.6, 256 bits)".into()),
@@ -93,7 +96,8 @@ fn images_that_contradict_themselves_are_refused() {
     let path = dir.path().join("a.exr");
     let short = Image { width: 2, height: 2, channels: vec![f32s("Y", vec![0.0; 3])], metadata: vec![] };
     assert!(output::save(&short, &path).is_err());
-    let twice = Image { width: 1, height: 1, channels: vec![f32s("Y", vec![0.0]), f32s("Y", vec![0.0])], metadata: vec![] };
+    let twice =
+        Image { width: 1, height: 1, channels: vec![f32s("Y", vec![0.0]), f32s("Y", vec![0.0])], metadata: vec![] };
     assert!(output::save(&twice, &path).is_err());
     assert!(output::save(&Image::default(), &path).is_err());
     assert_eq!(crate::files_in(dir.path()), 0);
@@ -239,17 +243,19 @@ fn fifo() {
 #[test]
 fn full_disk() {
     let dir = tempfile::tempdir().unwrap();
-    let mount = |args: &[&str]| Command::new("mount").args(args).arg(dir.path()).output().is_ok_and(|o| o.status.success());
+    let mount =
+        |args: &[&str]| Command::new("mount").args(args).arg(dir.path()).output().is_ok_and(|o| o.status.success());
     if !mount(&["-t", "tmpfs", "-o", "size=64k", "skylit-test"]) {
         println!("skipped: may not mount a tmpfs");
         return;
     }
     let noise: Vec<f32> = (0..65536u32).map(|i| f32::from_bits(i.wrapping_mul(2_654_435_761) >> 2)).collect();
     let image = Image { width: 256, height: 256, channels: vec![f32s("Y", noise)], metadata: vec![] };
-    let results = ["a.exr", "a.png"].map(|name| output::save(&image, &dir.path().join(name)).map_err(|e| e.to_string()));
+    let results =
+        ["a.exr", "a.png"].map(|name| output::save(&image, &dir.path().join(name)).map_err(|e| e.to_string()));
     let left = crate::files_in(dir.path());
-    let read_only =
-        mount(&["-o", "remount,ro"]).then(|| files::check_writable(&dir.path().join("b.exr")).map_err(|e| e.to_string()));
+    let read_only = mount(&["-o", "remount,ro"])
+        .then(|| files::check_writable(&dir.path().join("b.exr")).map_err(|e| e.to_string()));
     Command::new("umount").arg(dir.path()).status().unwrap();
     assert!(results[0].as_ref().is_err_and(|e| e.ends_with("cannot write: the disk is full")), "{results:?}");
     assert_eq!(left, usize::from(results[1].is_ok()));

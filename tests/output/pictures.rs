@@ -71,7 +71,8 @@ fn alpha_is_straight_and_every_bit_is_right() {
         for (bits, most) in [(PngBits::Eight, 255.0), (PngBits::Sixteen, 65535.0)] {
             for encoding in [PngEncoding::Srgb, PngEncoding::Linear] {
                 let settings = settings(bits, encoding);
-                let picture = Picture::new(&unassociated(&image), Some(Background::Transparent), &settings, &path).unwrap();
+                let picture =
+                    Picture::new(&unassociated(&image), Some(Background::Transparent), &settings, &path).unwrap();
                 picture.save(&path, 90).unwrap();
                 let (values, info) = decode(&path);
                 assert_eq!(info.color_type.samples(), names.len() + 1);
@@ -83,7 +84,10 @@ fn alpha_is_straight_and_every_bit_is_right() {
                         let coded = if encoding == PngEncoding::Srgb { srgb(straight) } else { straight };
                         let value = f64::from(values[(names.len() + 1) * i + c]);
                         // half a step, and what single precision is off where it falls between two steps
-                        assert!((value - coded * most).abs() < 0.5 + 2e-7 * most, "{bits:?} {encoding:?} {name} {i}: {value}");
+                        assert!(
+                            (value - coded * most).abs() < 0.5 + 2e-7 * most,
+                            "{bits:?} {encoding:?} {name} {i}: {value}"
+                        );
                     }
                 }
                 let of_alpha: Vec<_> = (0..n).map(|i| values[(names.len() + 1) * i + names.len()]).collect();
@@ -152,7 +156,8 @@ fn backgrounds_are_composited_in_linear_light() {
     // on black it is what it is without alpha
     let black = Picture::new(&unassociated(&image), Some(Background::Colour([0.0; 3])), &settings, &path).unwrap();
     let plain = Picture::new(&image, None, &settings, &path).unwrap();
-    let words = |p: &Picture| p.bytes.chunks_exact(2).map(|b| i32::from(u16::from_be_bytes([b[0], b[1]]))).collect::<Vec<_>>();
+    let words =
+        |p: &Picture| p.bytes.chunks_exact(2).map(|b| i32::from(u16::from_be_bytes([b[0], b[1]]))).collect::<Vec<_>>();
     assert!(words(&black).iter().zip(words(&plain)).all(|(a, b)| (a - b).abs() <= 1));
 }
 
@@ -211,7 +216,8 @@ fn jpeg_and_webp() {
     // with alpha
     let image = sample(&["R", "G", "B"]);
     let transparent =
-        Picture::new(&unassociated(&image), Some(Background::Transparent), &FileSettings::default(), &at("t.webp")).unwrap();
+        Picture::new(&unassociated(&image), Some(Background::Transparent), &FileSettings::default(), &at("t.webp"))
+            .unwrap();
     transparent.save(&at("t.webp"), 90).unwrap();
     let decoded = image::load_from_memory(&std::fs::read(at("t.webp")).unwrap()).unwrap();
     assert_eq!((decoded.color(), decoded.as_bytes()), (image::ColorType::Rgba8, transparent.bytes.as_slice()));
@@ -221,7 +227,9 @@ fn jpeg_and_webp() {
     assert!(refused(&transparent, "t.jpg").contains("JPEG has no alpha"));
     let deep = Picture::new(&image, None, &settings(PngBits::Sixteen, PngEncoding::Srgb), &at("d.webp")).unwrap();
     assert!(refused(&deep, "d.webp").contains("8-bit sRGB only"));
-    assert!(refused(&deep, "d.exr").contains("8-bit sRGB only") && refused(&transparent, "d.exr").contains("not a picture"));
+    assert!(
+        refused(&deep, "d.exr").contains("8-bit sRGB only") && refused(&transparent, "d.exr").contains("not a picture")
+    );
     let wide = Picture::of_bytes(vec![0; 70_000], [70_000, 1], Colour::Grey).unwrap();
     assert!(refused(&wide, "w.jpg").contains("65535 pixels") && refused(&wide, "w.webp").contains("16384 pixels"));
     std::fs::write(at("broken.jpg"), b"\xff\xd8no").unwrap();

@@ -28,8 +28,11 @@ impl Seen<'_> {
 
     /// Pixels that show nothing but the mirrors.
     fn mirrors(&self) -> Vec<usize> {
-        let options =
-            PathOptions { samples: SampleSettings::new(SIZE, 64, 0), view: Some(View::Albedo), ..PathOptions::default() };
+        let options = PathOptions {
+            samples: SampleSettings::new(SIZE, 64, 0),
+            view: Some(View::Albedo),
+            ..PathOptions::default()
+        };
         let albedo = render(&self.tracer, self.flat, &options).image.film;
         let whole = |p: &[f32]| p.iter().all(|c| (c - MIRROR_ALBEDO).abs() < 1e-5);
         albedo.mean.chunks(3).enumerate().filter(|(_, p)| whole(p)).map(|(k, _)| k).collect()
@@ -118,7 +121,8 @@ fn gpu_glass_lets_light_through_with_the_third_bounce() {
     on_a_tracer(&scene, |kind, seen| {
         // the middle of the sphere's image
         let [x, y] = [(0.64 * f64::from(SIZE[0])) as usize, (0.74 * f64::from(SIZE[1])) as usize];
-        let middle: Vec<usize> = (y - 2..y + 2).flat_map(|y| (x - 2..x + 2).map(move |x| y * SIZE[0] as usize + x)).collect();
+        let middle: Vec<usize> =
+            (y - 2..y + 2).flat_map(|y| (x - 2..x + 2).map(move |x| y * SIZE[0] as usize + x)).collect();
         let seen: Vec<f32> = (1..=4).map(|depth| mean_brightness(&seen.with(depth), &middle)).collect();
         println!("{kind}: through the glass with 1 to 4 bounces: {seen:?}");
         // what is reflected is a twenty-fifth

@@ -323,7 +323,13 @@ fn samples_follow_their_density(cases: &[Case], compensation: bool) {
             let (share, sd) = (rough / n, (density * (1.0 - density).max(1e-4) / n).sqrt());
             let chi = if rough > 0.0 { chi_square(&expected, &counts) } else { 0.0 };
             let (albedo, energy) = (reflected / n, energy / n);
-            println!("{:32} {:6.2} {density:9.5} {share:9.5} {:7.3} {chi:9.2} {:9.5}", case.name, view.z, delta / n, energy.x);
+            println!(
+                "{:32} {:6.2} {density:9.5} {share:9.5} {:7.3} {chi:9.2} {:9.5}",
+                case.name,
+                view.z,
+                delta / n,
+                energy.x
+            );
             worst = worst.max(chi);
             assert!((density - share).abs() <= 5.0 * sd + 3e-3, "{what}: density {density}, samples {share}");
             assert!(chi < 5.0, "{what}: samples do not follow their density: {chi} standard deviations");
@@ -376,7 +382,9 @@ fn gpu_directions_may_be_exchanged() {
     let mut checked = 0;
     for (part, case) in (0u32..).zip(&cases).filter(|(_, c)| c.reciprocal) {
         let side = if case.eta.is_some() || case.material.transmission.factor > 0.0 { 2.0 } else { 1.0 };
-        let two = |u: &[f64; 3]| (from_above(0.05 + 0.95 * u[0], 1.0), from_above(1.0 - (side - 0.05) * u[1], 2.0 * PI * u[2]));
+        let two = |u: &[f64; 3]| {
+            (from_above(0.05 + 0.95 * u[0], 1.0), from_above(1.0 - (side - 0.05) * u[1], 2.0 * PI * u[2]))
+        };
         let all: Vec<_> = random(256, 9).iter().map(two).filter(|(_, b)| b.z.abs() > 0.05).collect();
         let there = probe.ask_all(part, DVec3::Z, all.iter().map(|&(a, b)| (a, Ask::At(b))));
         let back = probe.ask_all(part, DVec3::Z, all.iter().map(|&(a, b)| (b, Ask::At(a))));
@@ -411,8 +419,10 @@ fn compensated() -> Vec<Case> {
     let case = |name, material| Case { name, material, reciprocal: false, conserves: None, eta: None };
     let body = |name, material| Case { eta: Some(1.5), ..case(name, material) };
     let half_specular = Specular { factor: 0.5, ..Default::default() };
-    let coated =
-        |factor, roughness, below| Material { clearcoat: Clearcoat { factor, roughness, ..Default::default() }, ..below };
+    let coated = |factor, roughness, below| Material {
+        clearcoat: Clearcoat { factor, roughness, ..Default::default() },
+        ..below
+    };
     vec![
         case("smooth coat over plastic", coated(1.0, 0.0, gltf(0.0, 0.6))),
         case("coat 0.3 over metal", coated(1.0, 0.3, gltf(1.0, 0.5))),
@@ -470,14 +480,21 @@ fn gpu_compensation_gives_back_what_is_lost() {
                 // radiance is compressed beyond the surface: as energy it is more, by the square of the index
                 let index = f64::from(case.material.ior).powi(if cosine > 0.0 { 2 } else { -2 });
                 let through = |a: &Answer| case.eta.is_some() && a.wi.z * cosine < 0.0;
-                let sum: f64 =
-                    drawn.iter().filter(|a| a.pdf > 0.0).map(|a| a.weight.x * if through(a) { index } else { 1.0 }).sum();
+                let sum: f64 = drawn
+                    .iter()
+                    .filter(|a| a.pdf > 0.0)
+                    .map(|a| a.weight.x * if through(a) { index } else { 1.0 })
+                    .sum();
                 sum / asks.len() as f64
             };
             let [plain, full] = probes.each_ref().map(energy);
             println!("{:30} {cosine:6.2} {plain:9.4} {full:11.4}", case.name);
             worst = worst.max((full - 1.0).abs());
-            assert!((full - 1.0).abs() <= 1e-2, "{}: {full} of the light at cosine {cosine}, {plain} without", case.name);
+            assert!(
+                (full - 1.0).abs() <= 1e-2,
+                "{}: {full} of the light at cosine {cosine}, {plain} without",
+                case.name
+            );
         }
         println!("{:30} at most off by {worst:.4}", case.name);
     }

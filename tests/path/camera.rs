@@ -55,9 +55,12 @@ fn gpu_filters_weigh_an_edge() {
             let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
             let coverage = ao::render(&tracer, &record, &options, &mut NoControl).unwrap().image.film.coverage;
             for x in 0..16 {
-                let column = |value: &dyn Fn(usize) -> f32| (0..16).map(|y| f64::from(value(y * 16 + x))).sum::<f64>() / 16.0;
+                let column =
+                    |value: &dyn Fn(usize) -> f32| (0..16).map(|y| f64::from(value(y * 16 + x))).sum::<f64>() / 16.0;
                 let expected = beyond(pixel_filter, 7.75 - x as f64);
-                for (what, found) in [("radiance", column(&|i| film.mean[3 * i])), ("coverage", column(&|i| coverage[i]))] {
+                for (what, found) in
+                    [("radiance", column(&|i| film.mean[3 * i])), ("coverage", column(&|i| coverage[i]))]
+                {
                     assert!(
                         (found - expected).abs() < 2e-3,
                         "{kind} {pixel_filter:?}, {what} of column {x}: {found}, expected {expected}"
@@ -111,7 +114,10 @@ fn gpu_a_lens_blurs_what_is_not_in_focus() {
         // a disk of radius r spreads by r^2 / 2
         let disk = (0.5 * radius * size as f64 / 4.0).powi(2) / 2.0;
         println!("{kind}: {sharp:.3} in focus, {blurred:.3} at twice the distance, a disk of {disk:.3}");
-        assert!((blurred - sharp - disk).abs() < 0.05 * disk, "{kind}: {blurred}, in focus {sharp}, expected {disk} more");
+        assert!(
+            (blurred - sharp - disk).abs() < 0.05 * disk,
+            "{kind}: {blurred}, in focus {sharp}, expected {disk} more"
+        );
     }
     assert_validation_clean(&device);
 }

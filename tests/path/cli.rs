@@ -37,8 +37,12 @@ fn gpu_an_image_that_goes_on_has_the_same_bytes() {
         let options = |more: &[&'static str]| [&["--integrator", integrator][..], more].concat();
         // the last one counts
         let render = |more: &[&str]| {
-            let args: Vec<&str> =
-                BASE.iter().copied().filter(|a| !["--integrator", "path"].contains(a)).chain(more.iter().copied()).collect();
+            let args: Vec<&str> = BASE
+                .iter()
+                .copied()
+                .filter(|a| !["--integrator", "path"].contains(a))
+                .chain(more.iter().copied())
+                .collect();
             // what is resumed is the same for all of them
             let validation: &[&str] = if integrator == "path" { &["--validation"] } else { &[] };
             let out = run(&[&args[..], &["--json"], validation].concat());
@@ -50,9 +54,14 @@ fn gpu_an_image_that_goes_on_has_the_same_bytes() {
         // in its own place, twice, and with a picture beside it
         render(&[&options(&["--spp", "7", "--resume"])[..], &[&begun, "-o", &begun]].concat());
         let record = render(
-            &[&options(&["--spp", "16", "--aov", "depth", "--resume"])[..], &[&begun, "-o", &begun, "-o", &png]].concat(),
+            &[&options(&["--spp", "16", "--aov", "depth", "--resume"])[..], &[&begun, "-o", &begun, "-o", &png]]
+                .concat(),
         );
-        assert_eq!((record["spp"].as_u64(), record["film"]["samples_before"].as_u64()), (Some(16), Some(7)), "{record}");
+        assert_eq!(
+            (record["spp"].as_u64(), record["film"]["samples_before"].as_u64()),
+            (Some(16), Some(7)),
+            "{record}"
+        );
         assert_eq!(
             record["rays"]["primary"].as_u64().unwrap() + record["rays"]["skipped_primary"].as_u64().unwrap(),
             9 * 40 * 24
@@ -70,7 +79,8 @@ fn gpu_an_image_that_goes_on_has_the_same_bytes() {
     // what is no image is not compared
     let out = run(&["diff", &whole, &begun, "--json"]);
     let difference: Value = serde_json::from_slice(&out.stdout).unwrap();
-    let channels: Vec<_> = difference["channels"].as_array().unwrap().iter().map(|c| c["channel"].as_str().unwrap()).collect();
+    let channels: Vec<_> =
+        difference["channels"].as_array().unwrap().iter().map(|c| c["channel"].as_str().unwrap()).collect();
     assert!(channels.contains(&"Y") && !channels.iter().any(|c| c.starts_with("state")), "{channels:?}");
 }
 
@@ -121,8 +131,9 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
         let args = [&BASE[..], &["--spp", spp, "--resume", &film, "-o", &out]].concat();
         args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
     };
-    let fails =
-        |args: Vec<String>, code: i32, says: &str| refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), code, says);
+    let fails = |args: Vec<String>, code: i32, says: &str| {
+        refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), code, says)
+    };
     fails(with("3", "film.exr"), 64, "has 4 samples per pixel already");
     fails(with("8", "plain.exr"), 3, "plain.exr: it has no film state to resume; render it with --resumable");
     fails(with("8", "none.exr"), 3, "no such file");
@@ -167,7 +178,8 @@ fn gpu_intervals_are_the_files_of_shorter_runs() {
     all.extend(["x.exr".to_owned(), "x.png".to_owned()]);
     assert_eq!(names(dir.path()), all);
     let (alone, picture) = (at("alone.exr"), at("alone.png"));
-    let files: Vec<(&str, String)> = intervals.iter().map(|n| (*n, format!("x.{n}"))).chain([("10", "x".to_owned())]).collect();
+    let files: Vec<(&str, String)> =
+        intervals.iter().map(|n| (*n, format!("x.{n}"))).chain([("10", "x".to_owned())]).collect();
     for (samples, name) in &files {
         let spp = samples.trim_start_matches('0');
         render(&["--spp", spp, "--resumable", "--aov", "ng", "-o", &alone, "-o", &picture]);
@@ -275,7 +287,8 @@ fn options_of_frames_are_refused_by_name() {
         let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
         refuses(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
     }
-    let sky = ["render", BASE[1], "-o", &image, "--integrator", "ao-sky", "--light", "point position=0,1,0 intensity=1"];
+    let sky =
+        ["render", BASE[1], "-o", &image, "--integrator", "ao-sky", "--light", "point position=0,1,0 intensity=1"];
     refuses(
         &sky,
         64,
@@ -302,7 +315,10 @@ fn gpu_what_is_compiled_is_told() {
         "{spot}"
     );
     let bsdf = told(&["--sampling", "bsdf", "--light", light, "--firefly-clamp", "9"]);
-    assert!(bsdf.contains("require radiance clamp; specialized out: emissive rectangles, emissive triangles"), "{bsdf}");
+    assert!(
+        bsdf.contains("require radiance clamp; specialized out: emissive rectangles, emissive triangles"),
+        "{bsdf}"
+    );
     let image = place(&dir, "b.exr");
     let out = run(&[
         "render",

@@ -119,7 +119,11 @@ fn gpu_constants_stay_and_nothing_crosses_an_edge() {
         for k in 0..pixels {
             if features.content[k] == PixelContent::OneSurface {
                 let expected = f32::from(u8::from(!near(k)));
-                assert!((image[3 * k] - expected).abs() < 1e-5, "{kind}: pixel {k} is {}, not {expected}", image[3 * k]);
+                assert!(
+                    (image[3 * k] - expected).abs() < 1e-5,
+                    "{kind}: pixel {k} is {}, not {expected}",
+                    image[3 * k]
+                );
             } else {
                 mixed += 1;
             }
@@ -187,7 +191,10 @@ fn gpu_the_film_stays_as_it_is() {
     let (plain, whole, out) = (at("plain.exr"), at("whole.exr"), at("x.exr"));
     let record = command(&["--spp", "4", "--intervals", "--denoise", "filter", "-o", &out, "-o", &at("x.png")]);
     let told = &record["denoise"];
-    assert!(told["denoiser"] == "filter" && told["biased"] == true && told["seconds"].as_f64().unwrap() > 0.0, "{record}");
+    assert!(
+        told["denoiser"] == "filter" && told["biased"] == true && told["seconds"].as_f64().unwrap() > 0.0,
+        "{record}"
+    );
     assert_eq!(names(dir.path()), ["x.0001.exr", "x.0001.png", "x.0002.exr", "x.0002.png", "x.exr", "x.png"]);
     command(&["--spp", "4", "--resumable", "-o", &plain, "-o", &at("plain.png")]);
     let (noisy, denoised) = (planes(&plain), planes(&out));

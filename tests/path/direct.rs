@@ -255,7 +255,11 @@ fn gpu_many_lights() {
         for (k, tile) in tiles.clone().enumerate() {
             scene.materials.push(emitter(strength));
             scene.meshes.push(Mesh { name: format!("tile {k}"), geometry: tile, material: 1 + k });
-            scene.instances.push(Instance { name: format!("tile {k}"), mesh: 1 + k, object_to_world: DAffine3::IDENTITY });
+            scene.instances.push(Instance {
+                name: format!("tile {k}"),
+                mesh: 1 + k,
+                object_to_world: DAffine3::IDENTITY,
+            });
         }
         scene
     };

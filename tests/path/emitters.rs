@@ -64,7 +64,10 @@ fn gpu_panels_are_sampled_by_their_pictures() {
             let values: Vec<f64> = film.mean.iter().map(|v| f64::from(*v)).collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             let error = (values.iter().map(|v| (v - expected).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
-            println!("{kind}, {strategy:?}: {mean:.6}, {expected:.6} by its form factor, RMSE {:.3} of it", error / expected);
+            println!(
+                "{kind}, {strategy:?}: {mean:.6}, {expected:.6} by its form factor, RMSE {:.3} of it",
+                error / expected
+            );
             assert!((mean / expected - 1.0).abs() < 0.02, "{kind}, {strategy:?}: {mean}, not {expected}");
             // two without parts
             assert!(error < 0.3 * expected, "{kind}, {strategy:?}: {error} of {expected}");
@@ -108,7 +111,10 @@ fn gpu_emitters_are_there_as_their_alpha_says() {
         let flat = FlatScene::for_paths(&scene);
         for kind in picked(&device) {
             let result = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 4));
-            assert!(result.image.film.mean.iter().all(|&m| m == 0.0), "{kind}: light from an emitter that is not there");
+            assert!(
+                result.image.film.mean.iter().all(|&m| m == 0.0),
+                "{kind}: light from an emitter that is not there"
+            );
             assert_eq!(result.lights, 0, "{kind}");
         }
     }
@@ -185,14 +191,16 @@ fn gpu_rectangles_are_what_their_triangles_are() {
 #[test]
 fn gpu_choices_among_lights_are_stratified() {
     let device = device();
-    let panels = [([-1.0, 0.0], [-1.0, 0.0]), ([0.2, 1.0], [-1.0, -0.1]), ([-1.0, -0.3], [0.3, 1.0]), ([0.1, 0.9], [0.2, 1.1])];
+    let panels =
+        [([-1.0, 0.0], [-1.0, 0.0]), ([0.2, 1.0], [-1.0, -0.1]), ([-1.0, -0.3], [0.3, 1.0]), ([0.1, 0.9], [0.2, 1.1])];
     let scene = floor_and(panels.iter().map(|&(x, z)| (panel(x, z), emitter(4.0))).collect());
     let expected: f64 = panels.iter().map(|&(x, z)| below(x, z)).sum();
     let flat = FlatScene::for_paths(&scene);
     let compute = tracer(&device, TracerKind::Compute, &flat);
     let rmse = |spp: u32| {
         let film = render(&compute, &flat, &options(Strategy::Light, spp)).image.film;
-        (film.mean.iter().map(|&m| (f64::from(m) - expected).powi(2)).sum::<f64>() / film.mean.len() as f64).sqrt() / expected
+        (film.mean.iter().map(|&m| (f64::from(m) - expected).powi(2)).sum::<f64>() / film.mean.len() as f64).sqrt()
+            / expected
     };
     let (few, many) = (rmse(64), rmse(1024));
     println!("relative error with 64 samples {few:.2e}, with 1024 {many:.2e}");

@@ -67,10 +67,13 @@ fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
                 // state that is not requested is not kept, and changes nothing
                 let plain = render(&tracer, &flat, &options).image;
                 assert!(
-                    plain.state.is_none() && plain.film.mean == whole.film.mean && plain.film.variance == whole.film.variance
+                    plain.state.is_none()
+                        && plain.film.mean == whole.film.mean
+                        && plain.film.variance == whole.film.variance
                 );
                 // another seed, other sums: the comparison sees something
-                let other = render(&tracer, &flat, &up_to(&options.clone().with_samples(|s| s.seed = 4), 16, None)).image;
+                let other =
+                    render(&tracer, &flat, &up_to(&options.clone().with_samples(|s| s.seed = 4), 16, None)).image;
                 assert_ne!(other.film.mean, whole.film.mean);
             }
         }
@@ -92,7 +95,10 @@ fn gpu_films_of_ambient_occlusion_go_on_too() {
             ao::render(
                 &tracer,
                 &record,
-                &AoOptions { samples: SampleSettings { film, ..SampleSettings::new(size, spp, 0) }, ..Default::default() },
+                &AoOptions {
+                    samples: SampleSettings { film, ..SampleSettings::new(size, spp, 0) },
+                    ..Default::default()
+                },
                 &mut NoControl,
             )
             .unwrap()
@@ -203,7 +209,8 @@ fn gpu_a_film_of_another_size_is_refused() {
     let tracer = tracer(&device, TracerKind::Compute, &flat);
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
     for other in [FilmState::new([8, 9], 3), FilmState::new([8, 8], 1)] {
-        let options = up_to(&PathOptions { samples: SampleSettings::new([8, 8], 16, 0), ..Default::default() }, 4, Some(other));
+        let options =
+            up_to(&PathOptions { samples: SampleSettings::new([8, 8], 16, 0), ..Default::default() }, 4, Some(other));
         let error = path::render(&tracer, &flat, &record, &options, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64);
         assert!(error.to_string().contains("cannot be resumed as one of 8x8 with 3"), "{error}");
@@ -212,8 +219,10 @@ fn gpu_a_film_of_another_size_is_refused() {
 
 /// Root of the mean square difference over the pixels that `of` chooses.
 fn rmse(film: &Film, reference: &Film, of: impl Fn(usize) -> bool) -> f64 {
-    let squares: Vec<f64> =
-        (0..film.mean.len()).filter(|k| of(k / 3)).map(|k| f64::from(film.mean[k] - reference.mean[k]).powi(2)).collect();
+    let squares: Vec<f64> = (0..film.mean.len())
+        .filter(|k| of(k / 3))
+        .map(|k| f64::from(film.mean[k] - reference.mean[k]).powi(2))
+        .collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
@@ -279,15 +288,21 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
         }
         // less error: those that are not good enough go on, from where they are
         let film = FilmOptions { target_rmse: Some(0.7 * target), ..Default::default() };
-        let better =
-            render(&tracer, &flat, &up_to(&options.clone().with_samples(|s| s.film = film), 4 * most, image.state.clone()))
-                .image;
+        let better = render(
+            &tracer,
+            &flat,
+            &up_to(&options.clone().with_samples(|s| s.film = film), 4 * most, image.state.clone()),
+        )
+        .image;
         assert!(better.film.estimated_rmse() <= 0.7 * target && better.converged.unwrap().done == 48, "{kind}");
         assert!(rmse(&better.film, &reference, |_| true) <= 1.05 * target, "{kind}");
         // and without a target, all do
         let untargeted = options.clone().with_samples(|s| s.film = FilmOptions::default());
         let even = render(&tracer, &flat, &up_to(&untargeted, 300, image.state.clone()));
-        assert!(even.image.film.samples.iter().zip(&image.film.samples).all(|(now, then)| *now == 300.max(*then)), "{kind}");
+        assert!(
+            even.image.film.samples.iter().zip(&image.film.samples).all(|(now, then)| *now == 300.max(*then)),
+            "{kind}"
+        );
     }
     assert_validation_clean(&device);
 }
@@ -348,9 +363,14 @@ fn gpu_an_integrator_renders_again() {
         assert_eq!(first.image.film.mean, second.image.film.mean, "{kind}");
         assert_eq!((first.bounce_rays, first.shadow_rays), (second.bounce_rays, second.shadow_rays), "{kind}");
         assert_ne!(first.image.film.mean, other.image.film.mean, "{kind}");
-        let alone =
-            path::render(&tracer, &flat, &record, &options.clone().with_samples(|s| (s.spp, s.seed) = (2, 3)), &mut NoControl)
-                .unwrap();
+        let alone = path::render(
+            &tracer,
+            &flat,
+            &record,
+            &options.clone().with_samples(|s| (s.spp, s.seed) = (2, 3)),
+            &mut NoControl,
+        )
+        .unwrap();
         assert_eq!(fewer.image.film.mean, alone.image.film.mean, "{kind}");
         let error = integrator.render(&tracer, &record, 9, 0, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64, "{error}");

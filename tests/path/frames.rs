@@ -109,14 +109,17 @@ fn gpu_frames_at_rest_become_the_still() {
         let flat = FlatScene::for_paths(&scene);
         let tracer = tracer(&device, TracerKind::Compute, &flat);
         // without the noise of caustics, which no number of samples here ends
-        let paths = PathOptions { firefly_clamp: 1.0, ..options(8192).with_samples(|s| s.pixel_filter = PixelFilter::Box) };
+        let paths =
+            PathOptions { firefly_clamp: 1.0, ..options(8192).with_samples(|s| s.pixel_filter = PixelFilter::Box) };
         let camera = record(&scene, &scene.cameras[0]);
         let mut integrator = PathIntegrator::new(&tracer, &flat, &paths).unwrap();
-        let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
+        let mut still =
+            |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
         let truth = still(8192, 1);
         let expected = rmse(&still(1024, 2), &truth);
         // Frames of 2, 2, 4, 8, 8, 8, 8 and 8 samples: better than a still of 35, and no worse than one of 40. The error of so few differs by a tenth from seed to seed.
-        let mean_error = |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
+        let mean_error =
+            |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
         let [early_least, early_still] = [35, 40].map(|spp| mean_error(&mut |seed| rmse(&still(spp, seed), &truth)));
         let early = mean_error(&mut |seed| {
             let paths = paths.clone().with_samples(|s| s.seed = seed);
@@ -176,7 +179,8 @@ fn gpu_frames_in_motion_are_clean_and_do_not_lag() {
     }
     noisy.frame(&tracer, &at(23), &[]).unwrap();
     let truth = options(512).with_samples(|s| s.pixel_filter = PixelFilter::Box);
-    let truth = PathIntegrator::new(&tracer, &flat, &truth).unwrap().render(&tracer, &at(23), 512, 9, &mut NoControl).unwrap();
+    let truth =
+        PathIntegrator::new(&tracer, &flat, &truth).unwrap().render(&tracer, &at(23), 512, 9, &mut NoControl).unwrap();
     // the lamp's edge, at fifty times the radiance of the walls, is another matter
     let dark = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| v.min(0.5)).collect() };
     let truth = dark(&truth.image.film.mean);
@@ -219,7 +223,8 @@ fn gpu_frames_forget_what_has_changed_and_no_more() {
     jumped.camera_to_world *= DAffine3::from_translation(DVec3::new(1.0, 0.0, 0.0));
     frames.frame(&tracer, &record(&scene, &jumped), &[]).unwrap();
     let (samples, covered) = (frames.samples().unwrap(), frames.coverage().unwrap());
-    let seen = |test: &dyn Fn(f32) -> bool| samples.iter().zip(&covered).filter(|(n, c)| **c > 0.0 && test(**n)).count();
+    let seen =
+        |test: &dyn Fn(f32) -> bool| samples.iter().zip(&covered).filter(|(n, c)| **c > 0.0 && test(**n)).count();
     let (kept, new) = (seen(&|n| n > 10.0), seen(&|n| n == 5.0));
     println!("{kept} pixels kept their history, {new} show another surface");
     // one path, and four more because nothing is known of them
@@ -268,7 +273,10 @@ fn gpu_frames_uncovered_pixels_have_more_paths() {
         let n = differences.len() as f64;
         let [five, one] = squares.map(|sum| (sum / n).sqrt());
         let bias = differences.iter().sum::<f64>() / n;
-        println!("{kind}: {} values, RMSE of five paths {five:.4}, of one {one:.4}, bias {bias:+.4}", differences.len());
+        println!(
+            "{kind}: {} values, RMSE of five paths {five:.4}, of one {one:.4}, bias {bias:+.4}",
+            differences.len()
+        );
         // 0.45 where paths are independent
         assert!(five < 0.6 * one, "{kind}: {five} of {one}");
         // channels of a pixel are not independent
@@ -481,7 +489,8 @@ fn gpu_frames_lights_move() {
             let differs = |(got, want): &(&f32, &f32)| (*got - *want).abs() > 2e-5 * want.abs().max(0.01);
             // where a ray meets an edge, rounding decides
             let wrong: Vec<_> = got.iter().zip(&still).enumerate().filter(|(_, pair)| differs(pair)).collect();
-            let some: Vec<_> = wrong.iter().take(12).map(|(k, (got, want))| format!("{}: {got} for {want}", k / 3)).collect();
+            let some: Vec<_> =
+                wrong.iter().take(12).map(|(k, (got, want))| format!("{}: {got} for {want}", k / 3)).collect();
             assert!(
                 wrong.len() * 200 <= got.len(),
                 "{kind}, at {time} s: {} of {} values differ from the posed scene's (pixel: value) {}",
@@ -580,7 +589,11 @@ fn gpu_frames_continue_in_another_size() {
         frame(&mut rests, full, 0.1);
         frame(&mut own, full, 0.1);
         assert!(rests.result().unwrap() == own.result().unwrap(), "{kind}: they are not what they were");
-        assert!(error(&rests, &truth[1]) < continued, "{kind}: coarse histories are better than {}", error(&rests, &truth[1]));
+        assert!(
+            error(&rests, &truth[1]) < continued,
+            "{kind}: coarse histories are better than {}",
+            error(&rests, &truth[1])
+        );
         frame(&mut rests, full, 30.0);
         assert!(rests.continue_from(&tracer, &moves, true).unwrap(), "{kind}: it has seen nothing of this");
     }

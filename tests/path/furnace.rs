@@ -73,7 +73,8 @@ pub fn plane(material: Material, cos_o: f64) -> Scene {
 fn gpu_half_metals_are_mixed_as_specified() {
     let device = device();
     let base = [0.9f32, 0.6, 0.3];
-    let material = Material { base_color: Vec3::from(base).extend(1.0), metallic: 0.5, roughness: 0.5, ..Material::default() };
+    let material =
+        Material { base_color: Vec3::from(base).extend(1.0), metallic: 0.5, roughness: 0.5, ..Material::default() };
     let cos_o = 0.75f64.sqrt();
     let surface = |base: f32| Surface { roughness: 0.5, metallic: 0.5, base: base.into(), ..WHITE };
     let expected = base.map(|c| surface(c).albedo(cos_o));
@@ -129,13 +130,16 @@ fn gpu_an_index_of_zero_reflects_by_the_specular_colour() {
     assert_eq!(all.materials[0].ior, 0.0);
     holds(&device, "all is reflected", &all, &options(16, Strategy::Mis), 1.0, 1e-3);
     let specular = |factor: f64, color: f64| {
-        format!(r#","KHR_materials_specular":{{"specularFactor":{factor},"specularColorFactor":[{color},{color},{color}]}}"#)
+        format!(
+            r#","KHR_materials_specular":{{"specularFactor":{factor},"specularColorFactor":[{color},{color},{color}]}}"#
+        )
     };
     let some = Surface { roughness: 0.4, base: 0.7, f0: 0.8 * 0.3, f90: 0.8, ..WHITE };
     let scene = load(0.7, 0.4, 0.0, &specular(0.8, 0.3));
     holds(&device, "specular colour", &scene, &options(256, Strategy::Mis), some.albedo(0.6), 5e-3);
     // a body of it transmits as thin walls do
-    let through = r#","KHR_materials_transmission":{"transmissionFactor":0.5},"KHR_materials_volume":{"thicknessFactor":1}"#;
+    let through =
+        r#","KHR_materials_transmission":{"transmissionFactor":0.5},"KHR_materials_volume":{"thicknessFactor":1}"#;
     let scene = load(0.7, 0.4, 0.0, &(specular(0.8, 0.3) + through));
     let expected = Surface { transmission: 0.5, ..some }.albedo(0.6);
     holds(&device, "a body", &scene, &options(256, Strategy::Mis), expected, 5e-3);

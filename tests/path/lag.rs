@@ -13,14 +13,20 @@ const SIZE: [u32; 2] = [96, 54];
 fn poles(width: f64, places: &[f64], sun: DVec3) -> Scene {
     let surface = |color: [f32; 3]| Material { base_color: Vec3::from(color).extend(1.0), ..matte(0.5) };
     let half = 0.5 * width;
-    let wall =
-        [DVec3::new(-6.0, 0.0, -3.0), DVec3::new(6.0, 0.0, -3.0), DVec3::new(6.0, 5.0, -3.0), DVec3::new(-6.0, 5.0, -3.0)];
+    let wall = [
+        DVec3::new(-6.0, 0.0, -3.0),
+        DVec3::new(6.0, 0.0, -3.0),
+        DVec3::new(6.0, 5.0, -3.0),
+        DVec3::new(-6.0, 5.0, -3.0),
+    ];
     let pole = |x: &f64| {
         let shape = shapes::cuboid(DVec3::new(x - half, 0.0, -half), DVec3::new(x + half, 2.0, half));
         (shape, surface([0.2, 0.3, 0.7]))
     };
-    let mut parts =
-        vec![(shapes::floor(DVec3::ZERO, 12.0), surface([0.7, 0.7, 0.7])), (shapes::quads(&[wall]), surface([0.5, 0.3, 0.2]))];
+    let mut parts = vec![
+        (shapes::floor(DVec3::ZERO, 12.0), surface([0.7, 0.7, 0.7])),
+        (shapes::quads(&[wall]), surface([0.5, 0.3, 0.2])),
+    ];
     parts.extend(places.iter().map(pole));
     let eye = DVec3::new(0.0, 2.2, 6.0);
     let mut scene = scene_of(parts, Camera::look_at(eye, eye + DVec3::new(0.0, -0.2, -1.0), DVec3::Y, 0.785));
@@ -47,7 +53,12 @@ fn still(tracer: &Tracer, flat: &FlatScene) -> Vec<f32> {
     };
     let camera = record(flat.scene);
     let mut integrator = PathIntegrator::new(tracer, flat, &options).unwrap();
-    red(&integrator.render(tracer, &camera, options.samples.spp, options.samples.seed, &mut NoControl).unwrap().image.film.mean)
+    red(&integrator
+        .render(tracer, &camera, options.samples.spp, options.samples.seed, &mut NoControl)
+        .unwrap()
+        .image
+        .film
+        .mean)
 }
 
 fn red(values: &[f32]) -> Vec<f32> {
@@ -56,7 +67,8 @@ fn red(values: &[f32]) -> Vec<f32> {
 
 fn frames(tracer: &Tracer, flat: &FlatScene, preset: Preset, seed: u32) -> Realtime {
     let settings = Settings { antialias: true, converge: true, seed, ..preset.settings() };
-    let options = PathOptions { samples: SampleSettings::new(SIZE, settings.rays_per_pixel, seed), ..Default::default() };
+    let options =
+        PathOptions { samples: SampleSettings::new(SIZE, settings.rays_per_pixel, seed), ..Default::default() };
     Realtime::radiance(tracer, flat, SIZE, &settings, &options).unwrap()
 }
 
@@ -118,7 +130,8 @@ fn gpu_frames_what_is_uncovered_at_an_edge_has_no_ghost() {
         let mut tracer = tracer(&device, kind, &flat);
         let mut frames = frames(&tracer, &flat, preset, 1);
         for frame in 0..16 {
-            let moved = tracer.update(&Changes { instances: vec![(2, place(frame))], ..Changes::default() }).unwrap().moved;
+            let moved =
+                tracer.update(&Changes { instances: vec![(2, place(frame))], ..Changes::default() }).unwrap().moved;
             frames.frame(&tracer, &record(&scene), &moved).unwrap();
         }
         let image = red(&frames.result().unwrap());
@@ -138,7 +151,11 @@ fn gpu_frames_after_a_cut_are_those_of_a_fresh_start() {
     let tracer = tracer(&device, TracerKind::Compute, &flat);
     let from = DVec3::new(0.0, 1.0, 5.0);
     let view = |eye: DVec3, target: DVec3| {
-        CameraRecord::new(&Camera::look_at(eye, target, DVec3::Y, 0.7), scene.origin(), f64::from(SIZE[0]) / f64::from(SIZE[1]))
+        CameraRecord::new(
+            &Camera::look_at(eye, target, DVec3::Y, 0.7),
+            scene.origin(),
+            f64::from(SIZE[0]) / f64::from(SIZE[1]),
+        )
     };
     let [wall, step] = [0.0, 0.05].map(|x| view(from, DVec3::new(x, 1.5, -3.0)));
     let floor = view(from, DVec3::new(-3.0, 0.0, 4.0));

@@ -87,7 +87,8 @@ fn adds_up(device: &Arc<Device>, what: &str, scene: &Scene, sources: [&Source; 2
         film(&with(&[source]), &options.clone().with_samples(|s| (s.spp, s.seed) = (16 * options.samples.spp, 9)))
     });
     let both = film(&with(&sources), options);
-    let truth: Vec<f64> = (alone[0].mean.iter().zip(&alone[1].mean)).map(|(&a, &b)| f64::from(a) + f64::from(b)).collect();
+    let truth: Vec<f64> =
+        (alone[0].mean.iter().zip(&alone[1].mean)).map(|(&a, &b)| f64::from(a) + f64::from(b)).collect();
     let mean = truth.iter().sum::<f64>() / truth.len() as f64;
     let squares: f64 = both.mean.iter().zip(&truth).map(|(&m, t)| (f64::from(m) - t).powi(2)).sum();
     let rmse = (squares / truth.len() as f64).sqrt();
@@ -105,7 +106,14 @@ fn gpu_a_lamp_is_found_beside_a_sky_on_any_ground() {
     for side in [20.0, 1e3, 1e6] {
         let scene = ground(side);
         let sky = sky(0.2);
-        adds_up(&device, &format!("point, {side}"), &scene, [&lamp(LightKind::Point, at, 3.2), &sky], &options(SPP, 1), 0.02);
+        adds_up(
+            &device,
+            &format!("point, {side}"),
+            &scene,
+            [&lamp(LightKind::Point, at, 3.2), &sky],
+            &options(SPP, 1),
+            0.02,
+        );
         adds_up(&device, &format!("panel, {side}"), &scene, [&panel(at, 0.4, 3.2), &sky], &options(SPP, 1), 0.02);
     }
     let mirrored = mirrored_ground(1e4);
@@ -124,7 +132,14 @@ fn gpu_a_lamp_is_found_beside_a_sun() {
     for (intensity, irradiance) in [(3.2, 1e-3), (3.2, 1.0), (3.2, 1e3)] {
         let sun = lamp(LightKind::Directional { angle: 0.01 }, DVec3::ZERO, irradiance);
         let what = format!("spot of {intensity} cd, sun of {irradiance} lx");
-        adds_up(&device, &what, &ground(1e4), [&lamp(spot, DVec3::Y * HEIGHT, intensity), &sun], &options(SPP, 1), 0.02);
+        adds_up(
+            &device,
+            &what,
+            &ground(1e4),
+            [&lamp(spot, DVec3::Y * HEIGHT, intensity), &sun],
+            &options(SPP, 1),
+            0.02,
+        );
         adds_up(&device, &format!("{what}, sky"), &ground(1e4), [&sky(0.2), &sun], &options(SPP, 1), 0.02);
         adds_up(&device, &format!("{what}, map"), &ground(1e4), [&map(1e3), &sun], &options(SPP, 1), 0.04);
     }

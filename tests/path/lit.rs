@@ -19,7 +19,12 @@ fn ambient(color: Vec3, radius: f64, falloff: f64) -> Ambient {
 
 /// What the integrator makes of these settings.
 fn lit(spp: u32, ambient: Ambient) -> PathOptions {
-    PathOptions { samples: SampleSettings::new(SIZE, spp, 5), max_depth: 1, ambient: Some(ambient), ..Default::default() }
+    PathOptions {
+        samples: SampleSettings::new(SIZE, spp, 5),
+        max_depth: 1,
+        ambient: Some(ambient),
+        ..Default::default()
+    }
 }
 
 /// A floor that fills the view, without any light.
@@ -85,7 +90,10 @@ fn gpu_lit_occlusion_can_darken_all_light() {
         let (mut darkened, mut sum) = (0, 0.0);
         for (k, (all, direct)) in all.iter().zip(&direct).enumerate() {
             let v = visible[k / 3];
-            assert!((all - v * direct).abs() <= 0.08 * direct + 1e-4, "{kind}: value {k} is {all}, not {v} of {direct}");
+            assert!(
+                (all - v * direct).abs() <= 0.08 * direct + 1e-4,
+                "{kind}: value {k} is {all}, not {v} of {direct}"
+            );
             darkened += usize::from(v < 0.9 && *direct > 0.0);
             sum += f64::from(all - v * direct);
         }
@@ -104,7 +112,8 @@ fn gpu_lit_without_lights_is_ao_times_albedo_times_ambient() {
         let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
         for (radius, falloff) in [(f64::INFINITY, 1.0), (1.5, 1.0), (f64::INFINITY, 2.0), (2.0, 1.5)] {
             let spp = if falloff > 1.0 { 64 } else { 8 };
-            let options = AoOptions { samples: SampleSettings::new(SIZE, spp, 5), radius, falloff, ..Default::default() };
+            let options =
+                AoOptions { samples: SampleSettings::new(SIZE, spp, 5), radius, falloff, ..Default::default() };
             let visibility = ao::render(tracer, &record, &options, &mut NoControl).unwrap().image.film;
             let result = render(tracer, flat, &lit(spp, ambient(colour, radius, falloff)));
             let film = result.image.film;
@@ -121,7 +130,10 @@ fn gpu_lit_without_lights_is_ao_times_albedo_times_ambient() {
                 let wanted = (0..film.mean.len()).map(|k| f64::from(expected(k))).sum::<f64>() / n;
                 let (_, error) = film.mean_and_error();
                 // the three channels of a sample have one ray
-                assert!((mean - wanted).abs() < 4.5 * 3f64.sqrt() * error, "{what}: {mean} +- {error}, {wanted} expected");
+                assert!(
+                    (mean - wanted).abs() < 4.5 * 3f64.sqrt() * error,
+                    "{what}: {mean} +- {error}, {wanted} expected"
+                );
                 assert!(error < 0.01 * wanted, "{what}: {error} says nothing");
             }
         }
@@ -133,12 +145,17 @@ fn gpu_lit_without_lights_is_ao_times_albedo_times_ambient() {
 fn gpu_lit_surfaces_that_do_not_scatter_show_no_ambient_light() {
     let white = ambient(Vec3::ONE, f64::INFINITY, 1.0);
     let mirror = Material { kind: MaterialKind::Mirror, specular_color: Vec3::ONE, ..Material::default() };
-    let glass =
-        Material { kind: MaterialKind::Glass, specular_color: Vec3::ONE, transmittance: Vec3::ONE, ..Material::default() };
+    let glass = Material {
+        kind: MaterialKind::Glass,
+        specular_color: Vec3::ONE,
+        transmittance: Vec3::ONE,
+        ..Material::default()
+    };
     let glowing = Material { emissive: Vec3::splat(3.0), ..matte(0.25) };
     let unlit = Material { unlit: true, ..matte(0.25) };
     let transmission = Transmission { factor: 0.5, ..Default::default() };
-    let wall = Material { roughness: 1.0, base_color: Vec3::splat(0.8).extend(1.0), transmission, ..Material::default() };
+    let wall =
+        Material { roughness: 1.0, base_color: Vec3::splat(0.8).extend(1.0), transmission, ..Material::default() };
     for (what, material, expected) in [
         ("mirror", mirror, 0.0),
         ("glass", glass, 0.0),
@@ -216,9 +233,13 @@ fn gpu_lit_distances_make_the_image() {
             let options = lit(20, settings);
             let film = render(tracer, flat, &options).image.film;
             let mut samples = vec![Vec::<AmbientSample>::new(); (SIZE[0] * SIZE[1]) as usize];
-            ambient::trace(tracer, flat, &record, &options, &mut NoControl, &mut |at, of| samples[at].extend(of)).unwrap();
+            ambient::trace(tracer, flat, &record, &options, &mut NoControl, &mut |at, of| samples[at].extend(of))
+                .unwrap();
             assert!(samples.iter().all(|s| s.len() == 20), "{kind}");
-            assert!(samples.iter().flatten().any(|s| f64::from(s.distance) > 2.0 * radius && s.distance.is_finite()), "{kind}");
+            assert!(
+                samples.iter().flatten().any(|s| f64::from(s.distance) > 2.0 * radius && s.distance.is_finite()),
+                "{kind}"
+            );
             let mut apart = 0;
             for (k, v) in film.mean.iter().enumerate() {
                 let open = |s: &&AmbientSample| f64::from(s.distance) >= radius;

@@ -50,7 +50,9 @@ use skylit::tracer::{Needs, Tracer, TracerKind};
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
     let validation = common::is_full() && common::validated().validation;
-    DEVICE.get_or_init(|| common::open(Options { keep_pipelines: common::KEPT, validation, ..Options::default() })).clone()
+    DEVICE
+        .get_or_init(|| common::open(Options { keep_pipelines: common::KEPT, validation, ..Options::default() }))
+        .clone()
 }
 
 fn tracer(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Tracer {
@@ -61,8 +63,8 @@ fn tracer(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Tracer {
 fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResult {
     let aspect = f64::from(options.samples.size[0]) / f64::from(options.samples.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
-    let result =
-        path::render(tracer, flat, &record, options, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
+    let result = path::render(tracer, flat, &record, options, &mut NoControl)
+        .unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
     assert_eq!(result.image.film.not_finite, 0, "{}: samples that are no numbers", tracer.kind());
     result
 }

@@ -33,7 +33,11 @@ fn gpu_coverage() {
     let seen = scene_of(vec![(sheet(0.5), covered(0.3, emitter(2.0))), (sheet(0.0), emitter(5.0))], ahead());
     holds(&device, "camera rays", &seen, &many, 0.3 * 2.0 + 0.7 * 5.0, 3e-3);
     let twice = scene_of(
-        vec![(sheet(0.5), covered(0.5, emitter(0.0))), (sheet(0.4), covered(0.25, emitter(0.0))), (sheet(0.0), emitter(5.0))],
+        vec![
+            (sheet(0.5), covered(0.5, emitter(0.0))),
+            (sheet(0.4), covered(0.25, emitter(0.0))),
+            (sheet(0.0), emitter(5.0)),
+        ],
         ahead(),
     );
     holds(&device, "two sheets", &twice, &many, 0.5 * 0.75 * 5.0, 4e-3);
@@ -152,7 +156,10 @@ fn gpu_shading_normals_make_no_light() {
         let (mean, error) = mean_of(&film);
         println!("coarse ball, {kind}: {mean:.4} +- {error:.4}");
         assert!(
-            film.mean.iter().zip(&film.variance).all(|(m, v)| f64::from(*m) <= 1.0 + 5.0 * (f64::from(*v) / 256.0).sqrt()),
+            film.mean
+                .iter()
+                .zip(&film.variance)
+                .all(|(m, v)| f64::from(*m) <= 1.0 + 5.0 * (f64::from(*v) / 256.0).sqrt()),
             "{kind}"
         );
         // what the terminator takes is little where normals lean by up to 20 degrees
@@ -183,7 +190,8 @@ fn gpu_deep_texels() {
         let float = with(vec![7.25f32, 7.25, 7.25, 1.0].into(), filter, lamp);
         holds(&device, "floats", &float, &options(4), 2.0 * 7.25, 1e-3);
         // two values of alpha that are the same in 8 bits, and a cutoff between them
-        let mask = Material { base_color_texture: slot, alpha_mode: AlphaMode::Mask { cutoff: 0.5002 }, ..emitter(2.0) };
+        let mask =
+            Material { base_color_texture: slot, alpha_mode: AlphaMode::Mask { cutoff: 0.5002 }, ..emitter(2.0) };
         for (alpha, seen) in [(32800u16, 2.0), (32770, 5.0)] {
             let mask = with(vec![65535u16, 65535, 65535, alpha].into(), filter, mask.clone());
             holds(&device, "alpha of 16 bits", &mask, &options(4), seen, 1e-3);
@@ -251,8 +259,10 @@ fn gpu_normal_maps_follow_tangents() {
             }
             let flat = FlatScene::for_paths(&scene);
             for kind in picked(&device) {
-                let options =
-                    PathOptions { view: Some(View::Normals), ..options(1).with_samples(|s| (s.size, s.spp) = ([4, 4], 2)) };
+                let options = PathOptions {
+                    view: Some(View::Normals),
+                    ..options(1).with_samples(|s| (s.size, s.spp) = ([4, 4], 2))
+                };
                 let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
                 for pixel in film.mean.chunks(3) {
                     let off = (Vec3::from_slice(pixel) - expected).length();
@@ -270,7 +280,8 @@ fn gpu_anisotropy_without_texture_coordinates() {
     let device = device();
     let folder = tempfile::tempdir().unwrap();
     let Geometry::Triangles(square) = sheet(0.0) else { panic!("no triangles") };
-    let floats: Vec<f32> = square.indices.iter().flatten().flat_map(|&i| square.positions[i as usize].to_array()).collect();
+    let floats: Vec<f32> =
+        square.indices.iter().flatten().flat_map(|&i| square.positions[i as usize].to_array()).collect();
     std::fs::write(folder.path().join("a.bin"), bytemuck::cast_slice::<f32, u8>(&floats)).unwrap();
     let count = floats.len() / 3;
     let document = serde_json::json!({
@@ -335,7 +346,9 @@ fn gpu_views_show_surfaces() {
             .image
             .film
         };
-        assert!(of(View::Albedo).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::new(0.2, 0.5, 0.8)).length() < 1e-6));
+        assert!(
+            of(View::Albedo).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::new(0.2, 0.5, 0.8)).length() < 1e-6)
+        );
         assert!(of(View::Normals).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::Z).length() < 1e-6));
         let depth = of(View::Depth);
         // two units ahead, a little more towards the corners
@@ -352,9 +365,10 @@ fn gpu_tracers_without_materials_are_refused() {
     let scene = scene_of(vec![(sheet(0.0), matte(0.5))], ahead());
     let flat = FlatScene::for_paths(&scene);
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
-    for (needs, says) in
-        [(Needs::default(), "Needs::shading"), (Needs { shading: true, white: true, ..Default::default() }, "Needs::white")]
-    {
+    for (needs, says) in [
+        (Needs::default(), "Needs::shading"),
+        (Needs { shading: true, white: true, ..Default::default() }, "Needs::white"),
+    ] {
         let tracer = Tracer::new(&device, TracerKind::Compute, &flat, needs).unwrap();
         let error = path::render(&tracer, &flat, &record, &options(1), &mut NoControl).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");

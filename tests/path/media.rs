@@ -67,9 +67,21 @@ fn gpu_volumes_lie_in_each_other() {
     direct_on_compute(&device, "glass that holds water", &one, 4, through(&[1.0, 1.5, 1.33, 1.5, 1.0]));
     let absorbing = light_below(vec![outer(0.5), inner(1.5, 0.2)], down_from(3.0));
     // nothing is reflected between media of one index
-    direct(&device, "absorption on both sides", &absorbing, 4, 0.5f64.powf(0.6) * 0.2f64.powf(0.4) * through(&[1.0, 1.5, 1.0]));
+    direct(
+        &device,
+        "absorption on both sides",
+        &absorbing,
+        4,
+        0.5f64.powf(0.6) * 0.2f64.powf(0.4) * through(&[1.0, 1.5, 1.0]),
+    );
     let clear = light_below(vec![outer(0.5), inner(1.33, 1.0)], down_from(3.0));
-    direct_on_compute(&device, "a clear body within", &clear, 4, 0.5f64.powf(0.6) * through(&[1.0, 1.5, 1.33, 1.5, 1.0]));
+    direct_on_compute(
+        &device,
+        "a clear body within",
+        &clear,
+        4,
+        0.5f64.powf(0.6) * through(&[1.0, 1.5, 1.33, 1.5, 1.0]),
+    );
 }
 
 /// Bodies that overlap: the one of higher priority is there, and the other's surface within it is not.
@@ -101,7 +113,13 @@ fn gpu_the_camera_may_be_inside() {
     direct_on_compute(&device, "in water", &water, 2, square * 0.3f64.powf(0.5) * through(&[1.33, 1.0]));
     let parts = vec![(block(0.0, 1.0, 4.0), body(1.5, 0.5, 0)), (block(0.3, 0.7, 2.0), body(1.33, 0.2, 0))];
     let both = light_below(parts, down_from(0.5));
-    direct(&device, "in water in glass", &both, 4, square * 0.2f64.powf(0.2) * 0.5f64.powf(0.3) * through(&[1.33, 1.5, 1.0]));
+    direct(
+        &device,
+        "in water in glass",
+        &both,
+        4,
+        square * 0.2f64.powf(0.2) * 0.5f64.powf(0.3) * through(&[1.33, 1.5, 1.0]),
+    );
     // mirrored and far from the origin: the winding is still what says inside
     let mut moved = both.clone();
     let far = DAffine3::from_translation(DVec3::new(3e3, -2e3, 5e3)) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
@@ -125,7 +143,15 @@ fn gpu_the_camera_may_be_inside() {
         range: f64::INFINITY,
     });
     let expected = 0.8 / std::f64::consts::PI * 2.0 / 0.64 * 0.5f64.powf(0.8 + 0.5);
-    holds_but_for(1e-4, &device, "a light in water", &lit, &PathOptions { max_depth: 1, ..self::options(16) }, expected, 5e-3);
+    holds_but_for(
+        1e-4,
+        &device,
+        "a light in water",
+        &lit,
+        &PathOptions { max_depth: 1, ..self::options(16) },
+        expected,
+        5e-3,
+    );
 }
 
 /// A wall without thickness that lets light through, but for what Fresnel's term reflects.

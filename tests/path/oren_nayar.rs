@@ -40,7 +40,8 @@ impl Exact {
         for i in 0..N {
             // uniformly in the square of the cosine: that is its weight
             let cos_i = ((f64::from(i) + 0.5) / f64::from(N)).sqrt();
-            sum += (0..N).map(|k| self.single(cos_i, cos_o, 2.0 * PI * (f64::from(k) + 0.5) / f64::from(N))).sum::<f64>();
+            sum +=
+                (0..N).map(|k| self.single(cos_i, cos_o, 2.0 * PI * (f64::from(k) + 0.5) / f64::from(N))).sum::<f64>();
         }
         sum / f64::from(N * N)
     }

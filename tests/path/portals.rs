@@ -107,7 +107,8 @@ fn gpu_portals_lessen_noise() {
         let squared_error = |portals: &[Portal]| {
             let scene = room(environment.clone(), portals);
             let flat = FlatScene::for_paths(&scene);
-            let film = render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options(Strategy::Mis, 16)).image.film;
+            let film =
+                render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options(Strategy::Mis, 16)).image.film;
             film.mean.iter().map(|&m| (f64::from(m) - expected).powi(2)).sum::<f64>() / film.mean.len() as f64
         };
         let [without, with] = [squared_error(&[]), squared_error(&[portal(1.0)])];

@@ -14,7 +14,11 @@ fn options(spp: u32) -> PathOptions {
 /// Chiang, Li, Burley, "Taming the Shadow Terminator" (2019): what is left of light from `wi` on a surface of normal z whose shading normal is `n`.
 fn shadowing(n: DVec3, wi: DVec3) -> f64 {
     let g = wi.z / (n.dot(wi) * n.z);
-    if wi.z <= 0.0 || n.dot(wi) <= 0.0 || g <= 0.0 { 0.0 } else { (g + g * g - g.powi(3)).min(1.0).max(f64::from(g >= 1.0)) }
+    if wi.z <= 0.0 || n.dot(wi) <= 0.0 || g <= 0.0 {
+        0.0
+    } else {
+        (g + g * g - g.powi(3)).min(1.0).max(f64::from(g >= 1.0))
+    }
 }
 
 fn tilted(degrees: f64) -> DVec3 {
@@ -37,7 +41,8 @@ fn sheet(normal: DVec3, mapped: bool, material: Material) -> Scene {
         return scene_of(vec![(Geometry::Triangles(mesh), material)], camera);
     }
     let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY };
-    let mut scene = scene_of(vec![(Geometry::Triangles(mesh), Material { normal_texture: Some(slot), ..material })], camera);
+    let mut scene =
+        scene_of(vec![(Geometry::Triangles(mesh), Material { normal_texture: Some(slot), ..material })], camera);
     let texel = (normal * 127.5 + 127.5).round().as_vec3().to_array().map(|c| c as u8);
     scene.textures.push(Texture {
         name: String::new(),
@@ -54,13 +59,20 @@ fn sheet(normal: DVec3, mapped: bool, material: Material) -> Scene {
 #[test]
 fn gpu_leaning_normals_gain_nothing_from_a_low_sun() {
     let device = device();
-    for (tilt, elevation, known) in
-        [(30.0, 3.0, Some(0.066)), (45.0, 10.0, None), (30.0, 60.0, None), (-30.0, 40.0, None), (-30.0, 20.0, Some(0.0))]
-    {
+    for (tilt, elevation, known) in [
+        (30.0, 3.0, Some(0.066)),
+        (45.0, 10.0, None),
+        (30.0, 60.0, None),
+        (-30.0, 40.0, None),
+        (-30.0, 20.0, Some(0.0)),
+    ] {
         let n = tilted(tilt);
         let wi = tilted(90.0 - elevation);
         let expected = n.dot(wi).max(0.0) * shadowing(n, wi);
-        assert!(expected <= 1.0 && known.is_none_or(|k: f64| (expected - k).abs() < 1e-3), "{tilt}, {elevation}: {expected}");
+        assert!(
+            expected <= 1.0 && known.is_none_or(|k: f64| (expected - k).abs() < 1e-3),
+            "{tilt}, {elevation}: {expected}"
+        );
         let mut scene = sheet(n, false, matte(1.0));
         scene.lights.push(Light {
             name: String::new(),
@@ -145,7 +157,8 @@ fn gpu_strategies_agree_about_leaning_normals() {
         scene.environment = Environment::Uniform(Vec3::ONE);
         let flat = FlatScene::for_paths(&scene);
         let compute = tracer(&device, TracerKind::Compute, &flat);
-        let of = |strategy, spp| mean_of(&render(&compute, &flat, &PathOptions { strategy, ..options(spp) }).image.film);
+        let of =
+            |strategy, spp| mean_of(&render(&compute, &flat, &PathOptions { strategy, ..options(spp) }).image.film);
         let (bsdf, error) = of(Strategy::Bsdf, 4096);
         println!("{what}: {bsdf:.4} +- {error:.5}");
         assert!(bsdf <= 1.0 + 4.0 * error, "{what}: {bsdf} of the light goes on");

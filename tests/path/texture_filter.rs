@@ -11,7 +11,14 @@ const SLOT: Option<TextureSlot> = Some(TextureSlot { texture: 0, texcoord: 0, tr
 
 fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Texture {
     let rgba8: Vec<u8> = (0..width * height).flat_map(|i| texel(i % width, i / width)).collect();
-    Texture { name: String::new(), width, height, texels: rgba8.into(), wrap: [Wrap::Repeat; 2], filter: Filter::Linear }
+    Texture {
+        name: String::new(),
+        width,
+        height,
+        texels: rgba8.into(),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Linear,
+    }
 }
 
 fn grey(v: u8) -> [u8; 4] {
@@ -20,11 +27,9 @@ fn grey(v: u8) -> [u8; 4] {
 
 /// Squares of so many texels, two by two.
 fn checkers(side: u32) -> Texture {
-    texture(
-        2 * side,
-        2 * side,
-        |x, y| if (x / side + y / side).is_multiple_of(2) { [230, 200, 180, 255] } else { [20, 30, 60, 255] },
-    )
+    texture(2 * side, 2 * side, |x, y| {
+        if (x / side + y / side).is_multiple_of(2) { [230, 200, 180, 255] } else { [20, 30, 60, 255] }
+    })
 }
 
 /// A parallelogram around `center` with edges `u` and `v` that faces `u x v` and shows so many textures in each direction.
@@ -75,7 +80,8 @@ fn gpu_baked_occlusion_has_a_strength() {
     let mut scene = wall(image, 1.0);
     let view = PathOptions { view: Some(View::BakedOcclusion), ..options(1, TextureFilter::Bilinear) };
     for kind in picked(&device) {
-        for (strength, occlusion_texture, expected) in [(1.0, SLOT, 0.2), (0.25, SLOT, 0.8), (0.0, SLOT, 1.0), (0.5, None, 1.0)]
+        for (strength, occlusion_texture, expected) in
+            [(1.0, SLOT, 0.2), (0.25, SLOT, 0.8), (0.0, SLOT, 1.0), (0.5, None, 1.0)]
         {
             let material = &mut scene.materials[0];
             (material.occlusion_texture, material.occlusion_strength) = (occlusion_texture, strength);
@@ -92,7 +98,8 @@ fn gpu_baked_occlusion_has_a_strength() {
 fn gpu_levels_of_deep_textures() {
     let device = device();
     let float: Vec<f32> = (0..64).flat_map(|i| if i % 2 == 0 { [9.0, 3.0, 0.0, 1.0] } else { [1.0; 4] }).collect();
-    let unorm: Vec<u16> = (0..64).flat_map(|i| if i % 2 == 0 { [1200u16, 600, 0, 65535] } else { [0, 0, 0, 65535] }).collect();
+    let unorm: Vec<u16> =
+        (0..64).flat_map(|i| if i % 2 == 0 { [1200u16, 600, 0, 65535] } else { [0, 0, 0, 65535] }).collect();
     let mean = |v: [f64; 3]| v.map(|v| v / 65535.0 / 12.92);
     for (texels, expected) in [(TexelData::from(float), [5.0, 2.0, 0.5]), (unorm.into(), mean([600.0, 300.0, 0.0]))] {
         let image = Texture { texels, ..texture(8, 8, |_, _| grey(0)) };
@@ -121,7 +128,8 @@ fn greatest_difference(a: &Film, b: &Film) -> f32 {
 }
 
 fn mean_colour(film: &Film) -> [f64; 3] {
-    [0, 1, 2].map(|c| film.mean.iter().skip(c).step_by(3).map(|&v| f64::from(v)).sum::<f64>() / (film.mean.len() / 3) as f64)
+    [0, 1, 2]
+        .map(|c| film.mean.iter().skip(c).step_by(3).map(|&v| f64::from(v)).sum::<f64>() / (film.mean.len() / 3) as f64)
 }
 
 #[test]
@@ -161,8 +169,8 @@ fn gpu_what_is_magnified_or_constant_stays_as_it_was() {
         let flat = FlatScene::for_paths(&scene);
         for kind in picked(&device) {
             let tracer = with_levels(&device, kind, &flat);
-            let [points, cones] =
-                [TextureFilter::Bilinear, TextureFilter::RayCone].map(|f| render(&tracer, &flat, &albedo(2, f)).image.film);
+            let [points, cones] = [TextureFilter::Bilinear, TextureFilter::RayCone]
+                .map(|f| render(&tracer, &flat, &albedo(2, f)).image.film);
             let difference = greatest_difference(&points, &cones);
             assert!(difference <= bound, "{what}, {kind}: differs by {difference}");
         }
@@ -202,7 +210,10 @@ fn gpu_averages_are_those_of_what_texels_mean() {
             .film;
             for (value, covered) in film.mean.chunks(3).zip(&film.coverage) {
                 let found = f64::from(value[0]) / f64::from(*covered).max(1e-9);
-                assert!(*covered > 0.0 && (found - expected).abs() < 2e-5, "{what}, {kind}: {found}, expected {expected}");
+                assert!(
+                    *covered > 0.0 && (found - expected).abs() < 2e-5,
+                    "{what}, {kind}: {found}, expected {expected}"
+                );
             }
         }
     }
@@ -226,7 +237,8 @@ fn gpu_mirrors_keep_cones() {
         ],
         camera,
     );
-    let image = texture(32, 32, |x, y| grey(if (x.min(31 - x) / 4 + y.min(31 - y) / 4).is_multiple_of(2) { 250 } else { 5 }));
+    let image =
+        texture(32, 32, |x, y| grey(if (x.min(31 - x) / 4 + y.min(31 - y) / 4).is_multiple_of(2) { 250 } else { 5 }));
     for kind in picked(&device) {
         let of = |scene: &Scene, filter: TextureFilter| {
             let scene = Scene { textures: vec![image.clone()], ..scene.clone() };

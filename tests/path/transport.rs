@@ -60,9 +60,12 @@ fn gpu_parts_of_light_add_up() {
     let whole = PathOptions { samples: SampleSettings::new([16, 16], 16, 1), ..Default::default() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
-        let [direct, indirect, all] =
-            [PathOptions { max_depth: 1, ..whole.clone() }, PathOptions { min_depth: 2, ..whole.clone() }, whole.clone()]
-                .map(|options| render(&tracer, &flat, &options).image.film.mean);
+        let [direct, indirect, all] = [
+            PathOptions { max_depth: 1, ..whole.clone() },
+            PathOptions { min_depth: 2, ..whole.clone() },
+            whole.clone(),
+        ]
+        .map(|options| render(&tracer, &flat, &options).image.film.mean);
         assert!(indirect.iter().any(|&c| c > 0.01) && indirect != all, "{kind}");
         for (k, &all) in all.iter().enumerate() {
             let sum = direct[k] + indirect[k];
@@ -78,8 +81,12 @@ fn gpu_roulette_changes_no_mean() {
     let device = device();
     let scene = by_name("cornell-box").unwrap();
     let flat = FlatScene::new(&scene);
-    let options =
-        PathOptions { samples: SampleSettings::new([16, 16], 256, 1), max_depth: 12, rr_depth: 100, ..Default::default() };
+    let options = PathOptions {
+        samples: SampleSettings::new([16, 16], 256, 1),
+        max_depth: 12,
+        rr_depth: 100,
+        ..Default::default()
+    };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let whole = render(&tracer, &flat, &options);
@@ -111,7 +118,8 @@ fn gpu_three_tracers_one_image_of_paths() {
             assert_eq!(first.mean, again.mean, "{name} {kind}: the same seed, other bits");
             assert!(first.mean.iter().any(|&m| m > 0.1), "{name} {kind}: dark");
             for (other, pixels) in &images {
-                let differ = first.mean.iter().zip(pixels).filter(|(a, b)| (**a - **b).abs() > 1e-3 * (1.0 + b.abs())).count();
+                let differ =
+                    first.mean.iter().zip(pixels).filter(|(a, b)| (**a - **b).abs() > 1e-3 * (1.0 + b.abs())).count();
                 println!("{name}: {kind} and {other} differ in {differ} of {} values", pixels.len());
                 // a path that goes elsewhere after a few bounces changes its pixel
                 assert!(

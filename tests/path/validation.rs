@@ -128,7 +128,8 @@ fn gpu_kernels_of_all_features_are_valid() {
         }),
         ..base.clone().with_samples(|s| s.pixel_filter = PixelFilter::Tent)
     };
-    let all_needs = Needs { shading: true, compensation: true, mip_levels: true, baked_occlusion: true, ..Needs::default() };
+    let all_needs =
+        Needs { shading: true, compensation: true, mip_levels: true, baked_occlusion: true, ..Needs::default() };
     let white = Needs { white: true, ..all_needs };
     let mut seen = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut holds = |kinds: &[TracerKind], scene: &Scene, needs: Needs, options: &PathOptions| {
@@ -179,7 +180,11 @@ fn gpu_kernels_of_all_features_are_valid() {
     }
     holds(&[TracerKind::Compute], &little, white, &PathOptions { white_sky: Some(0.5), ..base });
     assert_eq!(missing(BsdfModel::ALL, &seen.0, BsdfModel::label), [""; 0], "BSDFs of no image");
-    assert_eq!(missing(MaterialFeature::ALL, &seen.1, MaterialFeature::label), [""; 0], "features of materials of no image");
+    assert_eq!(
+        missing(MaterialFeature::ALL, &seen.1, MaterialFeature::label),
+        [""; 0],
+        "features of materials of no image"
+    );
     assert_eq!(missing(TextureFeature::ALL, &seen.2, TextureFeature::label), [""; 0], "textures of no image");
     assert_eq!(missing(PathFeature::ALL, &seen.3, PathFeature::label), [""; 0], "features of paths of no image");
     assert_eq!(missing(Kind::ALL, &seen.4, Kind::label), [""; 0], "kinds of lights of no image");

@@ -20,7 +20,8 @@ fn gpu_without_mirrors_it_is_direct_light() {
     let flat = FlatScene::for_paths(&scene);
     for kind in tracers(&device) {
         let direct = PathOptions { specular_only: false, max_depth: 1, ..whitted(8) };
-        let [ours, theirs] = [whitted(8), direct].map(|o| render(&tracer(&device, kind, &flat), &flat, &o).image.film.mean);
+        let [ours, theirs] =
+            [whitted(8), direct].map(|o| render(&tracer(&device, kind, &flat), &flat, &o).image.film.mean);
         assert!(ours == theirs, "{kind}");
     }
     assert_validation_clean(&device);

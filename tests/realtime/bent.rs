@@ -94,7 +94,10 @@ fn gpu_bent_normals_of_grooves() {
                 let camera = Camera::look_at(eye, point, DVec3::Z, 0.6);
                 let (mean, worst) = compare(&settle(&tracer, &scene, &[camera], &settings()), expected);
                 println!("groove of {degrees}, {kind}: mean {mean:.5}, expected {expected:.5}, worst {worst:.4}");
-                assert!(mean.distance(expected) < 3e-3 && worst < 0.08, "{degrees}, {kind}: {mean} is not {expected}, {worst}");
+                assert!(
+                    mean.distance(expected) < 3e-3 && worst < 0.08,
+                    "{degrees}, {kind}: {mean} is not {expected}, {worst}"
+                );
                 sum += mean;
             }
             let bisector = sum.normalize();

@@ -58,7 +58,8 @@ fn gpu_no_sequence_resolution_or_filter_is_biased_in_a_groove() {
     let camera = record(&scene, &Camera::look_at(up + normal * 0.5, up, DVec3::Z, 0.6), SIZE);
     let want = vec![exact::v_groove(angle) as f32; (SIZE[0] * SIZE[1]) as usize];
     let base = traced(Preset::Balanced);
-    let mut cases: Vec<Settings> = Sequence::ALL.map(|sequence| Settings { sequence, filter: NO_FILTER, ..base }).to_vec();
+    let mut cases: Vec<Settings> =
+        Sequence::ALL.map(|sequence| Settings { sequence, filter: NO_FILTER, ..base }).to_vec();
     cases.extend(
         [FilterKind::Box, FilterKind::Atrous]
             .map(|kind| Settings { filter: Filter { kind, radius: 3, samples: 256.0 }, ..base }),
@@ -71,7 +72,8 @@ fn gpu_no_sequence_resolution_or_filter_is_biased_in_a_groove() {
         // one tracer takes all of it, the others one case: their rays are the same
         let cases = if kind == kinds[0] { &cases[..] } else { &cases[1..2] };
         for s in cases {
-            let what = format!("{kind}, {:?}, {:?}, {:?}, {} rays", s.sequence, s.resolution, s.filter.kind, s.rays_per_pixel);
+            let what =
+                format!("{kind}, {:?}, {:?}, {:?}, {} rays", s.sequence, s.resolution, s.filter.kind, s.rays_per_pixel);
             judge(&what, error(&tracer, s, &camera, &want, SEEDS), 0.0);
         }
     }

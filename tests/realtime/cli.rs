@@ -17,7 +17,8 @@ fn json(args: &[&str]) -> Value {
 fn gpu_one_frame_as_png_and_as_exr() {
     let dir = tempfile::tempdir().unwrap();
     let (png, exr) = (place(&dir, "x.png"), place(&dir, "x.exr"));
-    let base = ["render", "builtin:stairs", "--preset", "fast", "--size", "64x36", "--antialias", "off", "--validation"];
+    let base =
+        ["render", "builtin:stairs", "--preset", "fast", "--size", "64x36", "--antialias", "off", "--validation"];
     let record = json(&[&base[..], &["-o", &png, "-o", &exr, "--json"]].concat());
     assert_eq!((record["preset"].as_str(), record["settings"]["history"].as_u64()), (Some("fast"), Some(32)));
     // it is settled: as many frames as its history counts, the last one kept, and one with camera rays
@@ -100,11 +101,24 @@ fn gpu_frames_by_number_tell_what_they_are() {
 fn gpu_an_animation_in_one_file() {
     let dir = tempfile::tempdir().unwrap();
     let (apng, file) = (place(&dir, "x.apng"), place(&dir, "x.##.png"));
-    let base =
-        ["render", "builtin:stairs", "--preset", "fast", "--orbit", "8", "--size", "32x18", "--frames", "2..6", "--fps", "10"];
+    let base = [
+        "render",
+        "builtin:stairs",
+        "--preset",
+        "fast",
+        "--orbit",
+        "8",
+        "--size",
+        "32x18",
+        "--frames",
+        "2..6",
+        "--fps",
+        "10",
+    ];
     json(&[&base[..], &["-o", &apng, "-o", &file, "--json"]].concat());
     assert_eq!(count(dir.path()), 5);
-    let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&apng).unwrap())).read_info().unwrap();
+    let mut reader =
+        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&apng).unwrap())).read_info().unwrap();
     assert_eq!(reader.info().animation_control.unwrap().num_frames, 4);
     let mut frames: Vec<Vec<u8>> = Vec::new();
     for frame in 2..6 {
@@ -130,8 +144,9 @@ fn what_does_not_go_together_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let (png, exr, apng, pattern) =
         (place(&dir, "x.png"), place(&dir, "x.exr"), place(&dir, "x.apng"), place(&dir, "x.##.apng"));
-    let render =
-        |extra: &[&str]| [&["render", "builtin:stairs"], extra].concat().iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+    let render = |extra: &[&str]| {
+        [&["render", "builtin:stairs"], extra].concat().iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()
+    };
     for (extra, says) in [
         (&["--preset", "fast", "--frames", "0..3", "-o", &exr][..], "a # for each digit"),
         (&["--preset", "fast", "--frames", "0..3", "-o", &pattern], "leave out the #"),
@@ -180,9 +195,14 @@ fn gpu_runs_that_fail_leave_nothing() {
 fn gpu_what_is_broken_off_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let apng = place(&dir, "x.apng");
-    let args = ["render", "builtin:stairs", "--preset", "fast", "--frames", "0..1000000", "--size", "64x36", "-o", &apng];
-    let mut child =
-        skylit(&args).env("SKYLIT_PROGRESS_SECONDS", "0.1").stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let args =
+        ["render", "builtin:stairs", "--preset", "fast", "--frames", "0..1000000", "--size", "64x36", "-o", &apng];
+    let mut child = skylit(&args)
+        .env("SKYLIT_PROGRESS_SECONDS", "0.1")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     // frames are being made: the file was begun, and has another name, or none, until it is whole
     assert!(lines.any(|l| l.starts_with("skylit: rendering: ")), "nothing was begun");

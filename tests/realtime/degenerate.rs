@@ -79,7 +79,11 @@ fn gpu_odd_cameras_leave_nothing_behind() {
     flat.camera_to_world.matrix3.z_axis = DVec3::ZERO;
     bad.push(record(&scene, &flat, SMALL));
     bad.push(record(&scene, &Camera::look_at(DVec3::new(1e7, 1e7, 1e7), DVec3::ZERO, DVec3::Y, 1e-7), SMALL));
-    bad.push(record(&scene, &Camera { projection: Projection::Orthographic { half_height: 0.0 }, ..own.clone() }, SMALL));
+    bad.push(record(
+        &scene,
+        &Camera { projection: Projection::Orthographic { half_height: 0.0 }, ..own.clone() },
+        SMALL,
+    ));
     check("stairs", &scene, &good, &bad);
 }
 

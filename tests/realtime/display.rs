@@ -89,7 +89,10 @@ fn gpu_displayed_numbers() {
         assert!(coverage.contains(&1.0) && coverage.contains(&0.0));
         for (word, c) in shown.iter().zip(coverage) {
             let expected = if *c == 1.0 { bytes } else { [0; 3] };
-            assert!((0..3).all(|k| word[k].abs_diff(expected[k]) <= 1) && word[3] == 255, "{what}: {word:?}, not {expected:?}");
+            assert!(
+                (0..3).all(|k| word[k].abs_diff(expected[k]) <= 1) && word[3] == 255,
+                "{what}: {word:?}, not {expected:?}"
+            );
         }
     };
     let shown = show(&tracer, &mut realtime, &camera, 3, display(DisplayMode::Samples, 0.0));
@@ -199,7 +202,8 @@ fn gpu_displayed_rays_are_those_of_the_frame() {
     let decoded: Vec<f32> = (0..256).map(|byte| skylit::colour::srgb_decode(byte as f32 / 255.0)).collect();
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
-        let settings = Settings { rays_per_pixel: 3, resolution: Resolution::Checkerboard, ..Preset::Balanced.settings() };
+        let settings =
+            Settings { rays_per_pixel: 3, resolution: Resolution::Checkerboard, ..Preset::Balanced.settings() };
         let most = settings.rays_per_pixel;
         let [mut realtime, mut plain] = [(); 2].map(|()| Realtime::new(&tracer, SIZE, &settings, &[]).unwrap());
         realtime.display(&tracer, Some(display(DisplayMode::Rays, 0.0))).unwrap();
@@ -225,7 +229,8 @@ fn gpu_displayed_rays_are_those_of_the_frame() {
             realtime.display(&tracer, Some(display(DisplayMode::Rays, 0.0))).unwrap();
             realtime.frame(&tracer, &camera, &[]).unwrap()
         };
-        let sum: f64 = words(&realtime).iter().map(|w| f64::from((decoded[usize::from(w[0])] * most as f32).round())).sum();
+        let sum: f64 =
+            words(&realtime).iter().map(|w| f64::from((decoded[usize::from(w[0])] * most as f32).round())).sum();
         assert_eq!(sum as u64, stats.occlusion_rays, "{kind}");
     }
     assert_validation_clean(&device);

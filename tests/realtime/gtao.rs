@@ -64,11 +64,19 @@ fn gpu_screen_space_a_plane_is_one() {
             for camera in [seen.clone(), rolled(&seen, 35.0), parallel] {
                 for settings in [sparse(), Settings { radius: 2.0, ..sparse() }] {
                     let (image, cover) = image(tracer, &settings, &record(&scene, &camera, SIZE));
-                    let values: Vec<f64> = (0..image.len()).filter(|&i| cover[i] > 0.0).map(|i| f64::from(image[i])).collect();
+                    let values: Vec<f64> =
+                        (0..image.len()).filter(|&i| cover[i] > 0.0).map(|i| f64::from(image[i])).collect();
                     let least = values.iter().copied().fold(1.0, f64::min);
-                    println!("{what}, {:?}: mean {:.4}, least {least:.4}", camera.projection, mean(values.iter().copied()));
+                    println!(
+                        "{what}, {:?}: mean {:.4}, least {least:.4}",
+                        camera.projection,
+                        mean(values.iter().copied())
+                    );
                     assert!(least > 0.99, "{what}: {least}");
-                    assert!((0..image.len()).all(|i| cover[i] > 0.0 || image[i] == 0.0), "{what}: background is touched");
+                    assert!(
+                        (0..image.len()).all(|i| cover[i] > 0.0 || image[i] == 0.0),
+                        "{what}: background is touched"
+                    );
                 }
             }
         }
@@ -98,7 +106,9 @@ fn gpu_screen_space_a_groove_is_as_the_closed_form_says() {
                         let distance = p.x.hypot(p.y);
                         // not at the bottom, where a pixel is not small
                         if distance > 0.3 && distance.is_finite() {
-                            errors.push(f64::from(image[i]) - exact::v_groove_finite(angle, distance, p.z, length, width));
+                            errors.push(
+                                f64::from(image[i]) - exact::v_groove_finite(angle, distance, p.z, length, width),
+                            );
                         }
                     }
                     let what = format!("{degrees} degrees, width {width}, {what}");

@@ -28,8 +28,9 @@ fn gpu_whole_numbers_are_the_hosts() {
     for divisor in [1, 2, 3, 5, 7, 8, 10, 97, 160, 240, 256, 1000, 1920, 2048, 4095, 16383, 16384, 65535] {
         // around multiples, where a rounded quotient is wrong first: the smallest, the largest, and some between
         let most = (i32::MAX as u32 / divisor).min((1 << 21) - 1);
-        for quotient in
-            [0, 1, 2, 3, 1000, most / 3, most / 2, most - 1, most].into_iter().chain((0..40).map(|k| random(k, divisor) % most))
+        for quotient in [0, 1, 2, 3, 1000, most / 3, most / 2, most - 1, most]
+            .into_iter()
+            .chain((0..40).map(|k| random(k, divisor) % most))
         {
             for off in [-1i64, 0, 1] {
                 let dividend = i64::from(quotient) * i64::from(divisor) + off;
@@ -46,12 +47,25 @@ fn gpu_whole_numbers_are_the_hosts() {
     }));
     let count = divisions.len() as u32;
     let large = (1 << 22) as f32;
-    let special =
-        [0.0, -0.0, 1.0, -1.0, large, -large, large - 1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, large + 1.0];
+    let special = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        large,
+        -large,
+        large - 1.0,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        1e30,
+        large + 1.0,
+    ];
     let inputs: Vec<[u32; 8]> = (0..count)
         .map(|i| {
             let [dividend, divisor] = divisions[i as usize];
-            let whole = special.get(i as usize).copied().unwrap_or((random(i, 3) as i32 >> (9 + random(i, 4) % 20)) as f32);
+            let whole =
+                special.get(i as usize).copied().unwrap_or((random(i, 3) as i32 >> (9 + random(i, 4) % 20)) as f32);
             let size = 1 + (random(i, 5) >> (18 + random(i, 6) % 14));
             let texel = -1 + (random(i, 7) % (2 * size + 3)) as i32;
             [dividend, divisor, whole.to_bits(), 0, texel as u32, size, MODES[random(i, 8) as usize % 3] as u32, 0]

@@ -73,7 +73,11 @@ fn gpu_larsen_traces_a_quarter_of_the_pixels_and_none_that_is_lit() {
         geometry: shapes::rectangle(DVec3::new(-1.5, 0.6, 0.0), DVec3::Y * 0.6, DVec3::Z * 0.8),
         material: 0,
     });
-    scene.instances.push(skylit::scene::Instance { name: "screen".into(), mesh: 2, object_to_world: DAffine3::IDENTITY });
+    scene.instances.push(skylit::scene::Instance {
+        name: "screen".into(),
+        mesh: 2,
+        object_to_world: DAffine3::IDENTITY,
+    });
     let eye = scene.cameras[0].camera_to_world.translation.as_vec3().to_array();
     let lamp = DVec3::new(-3.0, 1.2, 0.1);
     let oracle = Oracle::new(&scene, DVec3::ZERO);
@@ -104,12 +108,15 @@ fn gpu_larsen_traces_a_quarter_of_the_pixels_and_none_that_is_lit() {
             let seen = aov::render(&tracer, &view(&scene, size), size, &mut NoControl).unwrap();
             let dark = |i: usize| {
                 let p = DVec3::from_array(seen[i].position.map(f64::from)) + DVec3::Y * 1e-3;
-                oracle.closest(OracleRay { origin: p, direction: (lamp - p).normalize(), tmin: 0.0, tmax: f64::INFINITY }).t
+                oracle
+                    .closest(OracleRay { origin: p, direction: (lamp - p).normalize(), tmin: 0.0, tmax: f64::INFINITY })
+                    .t
                     < (lamp - p).length()
             };
             let at = |x: u32, y: u32| ((2 * y).min(size[1] - 1) * size[0] + (2 * x).min(size[0] - 1)) as usize;
             let want =
-                (0..half[1]).flat_map(|y| (0..half[0]).map(move |x| (x, y))).filter(|&(x, y)| dark(at(x, y))).count() as u64;
+                (0..half[1]).flat_map(|y| (0..half[0]).map(move |x| (x, y))).filter(|&(x, y)| dark(at(x, y))).count()
+                    as u64;
             assert!(want > quarter / 20 && want < quarter * 19 / 20, "{kind}: {want} of {quarter} are dark");
             // at the shadow's edge rounding decides
             assert!(rays.abs_diff(64 * want) <= 64 * 2, "{kind}: {rays} rays, {want} pixels in the dark");
@@ -137,7 +144,11 @@ fn gpu_larsen_has_two_patterns_in_turn() {
         }
         // a frame's own part of its half
         let own = |k: usize| {
-            results[k].iter().zip(&results[k - 1]).map(|(now, before)| f64::from(2.0 * now - before)).collect::<Vec<_>>()
+            results[k]
+                .iter()
+                .zip(&results[k - 1])
+                .map(|(now, before)| f64::from(2.0 * now - before))
+                .collect::<Vec<_>>()
         };
         let apart = |a: usize, b: usize| mean(own(a).iter().zip(own(b)).map(|(a, b)| (a - b).abs()));
         println!("{kind}: {:.1e} from frame to frame, {:.1e} over two", apart(2, 3), apart(2, 4));

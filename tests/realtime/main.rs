@@ -47,7 +47,8 @@ fn probe(device: &Arc<Device>, shader: &ComputeShader, inputs: &[[u32; 8]]) -> V
     let (count, bytes) = (inputs.len() as u32, 16 * inputs.len() as u64);
     let source = Buffer::from_slice(device, "probe inputs", inputs).unwrap();
     let results = Buffer::new(device, "probe outputs", bytes, Memory::Readback).unwrap();
-    let probe = Buffer::from_slice(device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
+    let probe =
+        Buffer::from_slice(device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
     let pipeline = shader.pipeline(device).unwrap();
     let push = Push { pass: probe.address(), count, ..Default::default() };
     Commands::new(device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();

@@ -22,7 +22,9 @@ use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
 use crate::common::{ALL, assert_validation_clean, device, record, scene, tracer, tracers};
-use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, rmse, scene_of, stepped, traced, triangles};
+use crate::{
+    NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, rmse, scene_of, stepped, traced, triangles,
+};
 
 #[test]
 fn gpu_a_moving_camera_is_hardly_worse_than_a_still_one() {
@@ -71,7 +73,8 @@ fn hidden_before(scene: &Scene, before: &CameraRecord, now: &CameraRecord) -> Ve
     let view = now.view.map(f64::from);
     (0..SIZE[0] * SIZE[1])
         .map(|i| {
-            let [x, y] = [(i % SIZE[0], SIZE[0]), (i / SIZE[0], SIZE[1])].map(|(v, n)| (2 * v + 1) as f64 / f64::from(n) - 1.0);
+            let [x, y] =
+                [(i % SIZE[0], SIZE[0]), (i / SIZE[0], SIZE[1])].map(|(v, n)| (2 * v + 1) as f64 / f64::from(n) - 1.0);
             let ray = look(now, [x * view[0], -y * view[1]]);
             let hit = oracle.closest(ray);
             if !hit.is_hit() {
@@ -82,7 +85,8 @@ fn hidden_before(scene: &Scene, before: &CameraRecord, now: &CameraRecord) -> Ve
             let inside = (0..2).all(|k| plane[k].abs() < view[k] * 1.05);
             // so that none of the four pixels around shows it; t is the view depth: directions have length 1 along the view
             let behind = |k: usize| {
-                let around = [0, 1].map(|axis| [-2.0, 0.0, 2.0][[k % 3, k / 3][axis]] * view[axis] / f64::from(SIZE[axis]));
+                let around =
+                    [0, 1].map(|axis| [-2.0, 0.0, 2.0][[k % 3, k / 3][axis]] * view[axis] / f64::from(SIZE[axis]));
                 oracle.closest(look(before, [plane[0] + around[0], plane[1] + around[1]])).t < -c.z * 0.9
             };
             c.z < 0.0 && (!inside || (0..9).all(behind))
@@ -218,7 +222,11 @@ fn gpu_displayed_reasons_of_rejected_histories() {
             let beyond = (-x).max(x - SIZE[0] as f32);
             outside += u32::from(beyond > 1.0);
             let expected = beyond > 1.0;
-            assert!(beyond.abs() <= 1.0 || (shown[k] == OFF_SCREEN) == expected, "{kind}: {:?}, {beyond} outside", shown[k]);
+            assert!(
+                beyond.abs() <= 1.0 || (shown[k] == OFF_SCREEN) == expected,
+                "{kind}: {:?}, {beyond} outside",
+                shown[k]
+            );
         }
         assert!(outside > 50, "{kind}: {outside}");
     }
@@ -310,7 +318,8 @@ fn gpu_what_has_moved_leaves_no_ghost() {
         let wrong = reference(&tracer, SIZE, &settings, &camera);
         let before = instances(&tracer, &camera);
         // floor, before and after: its history is there
-        let floor: Vec<f32> = before.iter().zip(&after).map(|(a, b)| if (*a, *b) == (0, 0) { 1.0 } else { 0.0 }).collect();
+        let floor: Vec<f32> =
+            before.iter().zip(&after).map(|(a, b)| if (*a, *b) == (0, 0) { 1.0 } else { 0.0 }).collect();
         let mut realtime = realtime(&tracer, SIZE, &settings);
         frames(&mut realtime, &tracer, &camera, 64);
         let image = realtime.result().unwrap();
@@ -328,7 +337,10 @@ fn gpu_what_has_moved_leaves_no_ghost() {
         frames(&mut fresh, &tracer, &camera, 8);
         let [a, b] = [&realtime, &fresh].map(|r| rmse(&r.result().unwrap(), &truth, &floor));
         let last = shares[7];
-        println!("{kind}: ghost {:.3?}; error {a:.4}, afresh {b:.4}", shares.iter().map(|r| r.share).collect::<Vec<_>>());
+        println!(
+            "{kind}: ghost {:.3?}; error {a:.4}, afresh {b:.4}",
+            shares.iter().map(|r| r.share).collect::<Vec<_>>()
+        );
         // noise that the filter spreads over 7x7 pixels has up to seven times the standard error
         assert!(last.share < 0.05 + 7.0 * last.standard_error && last.share < 0.15, "{kind}: {last:?}");
         assert!(a <= 1.25 * b + 0.005, "{kind}: error {a}, afresh {b}");
@@ -370,7 +382,10 @@ fn gpu_what_a_thin_pole_uncovers_is_what_is_there() {
             let mask: Vec<f32> = (0..now.len()).map(|k| if is_uncovered(k) { 1.0 } else { 0.0 }).collect();
             let left = Residual::from_images(&image, &truth, before, Some(&mask)).unwrap();
             println!("{kind}, {preset}: {frames} frames after: {left:?}");
-            assert!(left.share.abs() < 0.05 + 3.0 * left.standard_error, "{kind}, {preset}, {frames} frames after: {left:?}");
+            assert!(
+                left.share.abs() < 0.05 + 3.0 * left.standard_error,
+                "{kind}, {preset}, {frames} frames after: {left:?}"
+            );
         }
     }
     assert_validation_clean(&device);
@@ -477,7 +492,8 @@ fn gpu_what_moves_slowly_is_more_than_noise() {
         let mut tracer = moving(&device, kind, &scene, vec![1]);
         let mut realtime = realtime(&tracer, SIZE, &traced(Preset::Balanced));
         for frame in 0..24 {
-            let moved = tracer.update(&at(DAffine3::from_translation(DVec3::X * 0.004 * f64::from(frame)))).unwrap().moved;
+            let moved =
+                tracer.update(&at(DAffine3::from_translation(DVec3::X * 0.004 * f64::from(frame)))).unwrap().moved;
             realtime.frame(&tracer, &camera, &moved).unwrap();
         }
         let (samples, shown) = (realtime.samples().unwrap(), instances(&tracer, &camera));
@@ -498,7 +514,8 @@ fn gpu_an_animation_keeps_its_histories() {
     let motion = rig.motion(0).unwrap();
     let camera = record(&scene, &scene.cameras[0], SIZE);
     for kind in tracers(&device) {
-        let mut tracer = Tracer::new(&device, kind, &FlatScene::with_motion(&scene, motion.clone()).unwrap(), ALL).unwrap();
+        let mut tracer =
+            Tracer::new(&device, kind, &FlatScene::with_motion(&scene, motion.clone()).unwrap(), ALL).unwrap();
         let mut realtime = realtime(&tracer, SIZE, &settings);
         let mut pose = Pose::default();
         let count = 10;
@@ -511,7 +528,8 @@ fn gpu_an_animation_keeps_its_histories() {
         let (samples, shown) = (realtime.samples().unwrap(), instances(&tracer, &camera));
         let mut told = 0;
         for (id, instance) in scene.instances.iter().enumerate() {
-            let own: Vec<f64> = (0..samples.len()).filter(|&i| shown[i] == id as u32).map(|i| f64::from(samples[i])).collect();
+            let own: Vec<f64> =
+                (0..samples.len()).filter(|&i| shown[i] == id as u32).map(|i| f64::from(samples[i])).collect();
             if own.len() < 15 {
                 continue;
             }

@@ -7,7 +7,8 @@ use skylit::scene::Projection;
 use skylit::tracer::TracerKind;
 
 use crate::common::{
-    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, is_full, record, scene, tracer, tracers,
+    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, is_full, record, scene, tracer,
+    tracers,
 };
 use crate::{NO_FILTER, SIZE, assert_sound, bits, frames, realtime, rmse, stepped, traced};
 
@@ -78,7 +79,8 @@ fn gpu_long_frames_at_rest_converge_to_what_short_ones_do() {
     let perspective = stepped(&scene, SIZE, DVec3::ZERO);
     for camera in [perspective, record(&scene, &flat, SIZE)] {
         let settings = Settings { antialias: true, converge: true, rest_samples: 256, ..traced(Preset::Fast) };
-        let many = Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
+        let many =
+            Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
         let quick = tracer(&device, TracerKind::Compute, &scene);
         let mut truth = realtime(&quick, SIZE, &many);
         // the mean over places within the pixels
@@ -183,7 +185,8 @@ fn gpu_an_interrupted_image_converges() {
     let device = device();
     let scene = scene("stairs");
     let camera = stepped(&scene, SIZE, DVec3::ZERO);
-    let settings = Settings { antialias: true, converge: true, launch_rays: 20_000, rest_samples: 256, ..traced(Preset::Fast) };
+    let settings =
+        Settings { antialias: true, converge: true, launch_rays: 20_000, rest_samples: 256, ..traced(Preset::Fast) };
     let many = Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
     let quick = tracer(&device, TracerKind::Compute, &scene);
     let mut truth = realtime(&quick, SIZE, &many);

@@ -105,7 +105,8 @@ fn gpu_orthographic_cameras_keep_their_histories() {
         let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, SIZE, &settings);
         let at = |frame: u32| {
-            let mut camera = Camera { projection: Projection::Orthographic { half_height: 1.7 }, ..scene.cameras[0].clone() };
+            let mut camera =
+                Camera { projection: Projection::Orthographic { half_height: 1.7 }, ..scene.cameras[0].clone() };
             let step = DVec3::new(0.012, 0.02, -0.05) * f64::from(frame);
             camera.camera_to_world *= glam::DAffine3::from_translation(step);
             record(&scene, &camera, SIZE)
@@ -133,7 +134,8 @@ fn gpu_rays_of_one_frame_or_of_many_are_the_same_rays() {
         // any hit, and nearest hits
         let falloffs = if kind == TracerKind::Compute { &[1.0, 5.0][..] } else { &[5.0] };
         for &falloff in falloffs {
-            let base = Settings { sequence: Sequence::Sobol, filter: NO_FILTER, falloff, history: 64, ..traced(Preset::Fast) };
+            let base =
+                Settings { sequence: Sequence::Sobol, filter: NO_FILTER, falloff, history: 64, ..traced(Preset::Fast) };
             let run = |rays: u32, count: u32| {
                 let mut realtime = realtime(&tracer, SIZE, &Settings { rays_per_pixel: rays, ..base });
                 frames(&mut realtime, &tracer, &stepped(&scene, SIZE, DVec3::ZERO), count);

@@ -69,7 +69,11 @@ fn gpu_what_has_not_moved_is_not_traced_again() {
             assert!(samples.iter().zip(&cover).all(|(n, c)| *n == full * c), "{kind}: a history that is not full");
             let before = [realtime.result().unwrap(), realtime.unfiltered().unwrap()].map(|v| bits(&v));
             for s in frames(&mut realtime, &tracer, &still, 3) {
-                assert_eq!((s.primary_rays, s.occlusion_rays), (0, if rest { 0 } else { seen * u64::from(rays) }), "{kind}");
+                assert_eq!(
+                    (s.primary_rays, s.occlusion_rays),
+                    (0, if rest { 0 } else { seen * u64::from(rays) }),
+                    "{kind}"
+                );
             }
             let after = [realtime.result().unwrap(), realtime.unfiltered().unwrap()].map(|v| bits(&v));
             assert_eq!(before == after, rest, "{kind}: an image at rest changes, or one that is not does not");

@@ -45,7 +45,11 @@ fn gpu_three_tracers_one_image() {
         for (kind, other) in kinds.iter().zip(&runs).skip(1) {
             let (shares, by) = differences(&runs[0], other);
             println!("{name}, falloff {falloff}: {} and {kind}: shares {shares:.5?}, means by {by:.1e}", kinds[0]);
-            assert!(shares[0] <= 5e-4 && shares[1] <= 5e-3 && by <= 2e-5, "{name}: {} and {kind}: {shares:?} {by}", kinds[0]);
+            assert!(
+                shares[0] <= 5e-4 && shares[1] <= 5e-3 && by <= 2e-5,
+                "{name}: {} and {kind}: {shares:?} {by}",
+                kinds[0]
+            );
         }
         // another seed is another image, so the comparison sees something
         let other = run(&tracer(&device, kinds[0], &scene), &scene, &Settings { seed: 1, ..settings });

@@ -173,8 +173,12 @@ fn gpu_degenerate_needles() {
             let axis = wide.direction.abs().max_position();
             let depth = corners.map(|v| (v - wide.origin)[axis] / wide.direction[axis]);
             let slack = 1e-4 / wide.direction.length();
-            let (lo, hi) = (depth.iter().copied().fold(f64::MAX, f64::min), depth.iter().copied().fold(f64::MIN, f64::max));
-            assert!((lo - slack..=hi + slack).contains(&(hit.t as f64)), "{kind}: {r:?} {hit:?}, between {lo} and {hi}");
+            let (lo, hi) =
+                (depth.iter().copied().fold(f64::MAX, f64::min), depth.iter().copied().fold(f64::MIN, f64::max));
+            assert!(
+                (lo - slack..=hi + slack).contains(&(hit.t as f64)),
+                "{kind}: {r:?} {hit:?}, between {lo} and {hi}"
+            );
             // seen along the ray, the line passes the needle
             let flat = corners.map(|v| {
                 let p = v - wide.origin;

@@ -112,7 +112,8 @@ fn gpu_moving_instances() {
     for kind in tracers(&device) {
         for (name, far) in [("grid:2", 0.3), ("cornell-spheres", 0.05), ("leaf-cards", 0.1)] {
             let scene = scene(name);
-            let moving = if name == "cornell-spheres" { vec![0, scene.instances.len() - 1] } else { all_instances(&scene) };
+            let moving =
+                if name == "cornell-spheres" { vec![0, scene.instances.len() - 1] } else { all_instances(&scene) };
             let mut f = Follower::new(&device, kind, &scene, Motion { instances: moving.clone(), meshes: Vec::new() });
             for step in 0..2 {
                 let stats = f.step(|s| wander(s, &moving, step, far));
@@ -153,7 +154,8 @@ fn waves(positions: &mut [Vec3], step: u32) {
     let phase = step as f32;
     for p in positions {
         let d = *p / p.length().max(1e-3);
-        *p = d * (1.0 + 0.3 * (5.0 * d.x + phase).sin() * (4.0 * d.y - phase).cos()) + 0.2 * Vec3::new(d.z, 0.0, -d.y) * phase;
+        *p = d * (1.0 + 0.3 * (5.0 * d.x + phase).sin() * (4.0 * d.y - phase).cos())
+            + 0.2 * Vec3::new(d.z, 0.0, -d.y) * phase;
     }
 }
 
@@ -242,7 +244,8 @@ fn gpu_nothing_leaks_after_a_refit() {
     for m in [squeeze, shear, DMat3::from_diagonal(DVec3::splat(1e4)), DMat3::from_rotation_x(1.0)] {
         let moved: Vec<Vec3> = sphere.iter().map(|p| (m * p.as_dvec3()).as_vec3()).collect();
         positions_mut(&mut scene, 0).copy_from_slice(&moved);
-        let changes = Changes { meshes: vec![MeshChange { mesh: 0, positions: &moved, normals: None }], ..Default::default() };
+        let changes =
+            Changes { meshes: vec![MeshChange { mesh: 0, positions: &moved, normals: None }], ..Default::default() };
         let stats = tracer.update(&changes).unwrap();
         let oracle = Oracle::new(&scene, scene.origin());
         let rays = leak_rays(&oracle, 200_000, 7);
@@ -296,7 +299,12 @@ fn gpu_bad_changes_are_refused_and_change_nothing() {
         Motion { instances: Vec::new(), meshes: vec![999] },
         Motion {
             instances: Vec::new(),
-            meshes: spheres.meshes.iter().position(|m| matches!(m.geometry, Geometry::Spheres(_))).into_iter().collect(),
+            meshes: spheres
+                .meshes
+                .iter()
+                .position(|m| matches!(m.geometry, Geometry::Spheres(_)))
+                .into_iter()
+                .collect(),
         },
     ] {
         assert!(matches!(FlatScene::with_motion(&spheres, motion), Err(Error::Usage(_))));
@@ -314,7 +322,8 @@ fn gpu_a_scene_that_stays_pays_nothing() {
     let stats = Tracer::new(&device, TracerKind::Compute, &none, ALL).unwrap().stats();
     assert_eq!((stays.structure_bytes, stays.stack_entries), (stats.structure_bytes, stats.stack_entries));
     let moves = Motion { instances: vec![0], meshes: Vec::new() };
-    let moves =
-        Tracer::new(&device, TracerKind::Compute, &FlatScene::with_motion(&scene, moves).unwrap(), ALL).unwrap().stats();
+    let moves = Tracer::new(&device, TracerKind::Compute, &FlatScene::with_motion(&scene, moves).unwrap(), ALL)
+        .unwrap()
+        .stats();
     assert!(moves.structure_bytes > stays.structure_bytes);
 }

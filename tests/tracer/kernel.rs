@@ -136,7 +136,10 @@ fn rays_at(oracle: &Oracle, each: u32) -> Vec<Ray> {
 fn that_pass_both(oracle: &Oracle, rays: &[Ray]) -> usize {
     let passes = |r: &Ray| {
         let r = OracleRay::from(r);
-        oracle.triangles().chunks_exact(2).any(|quad| quad.iter().all(|t| t.intersect(&r).is_some_and(|(t, _)| t > 0.0)))
+        oracle
+            .triangles()
+            .chunks_exact(2)
+            .any(|quad| quad.iter().all(|t| t.intersect(&r).is_some_and(|(t, _)| t > 0.0)))
     };
     rays.iter().filter(|r| passes(r)).count()
 }
@@ -155,7 +158,10 @@ fn gpu_kernel_pairs() {
     judge(&device, "folded quads", &scene, &rays, |tracer| {
         // the quads are in pairs: half a block a triangle, and a seventh of that again for nodes, would not do for single ones
         let bytes = tracer.stats().bytes_per_primitive();
-        assert!(tracer.kind() != TracerKind::Compute || bytes < 56.0, "{bytes} bytes for each of {triangles} triangles");
+        assert!(
+            tracer.kind() != TracerKind::Compute || bytes < 56.0,
+            "{bytes} bytes for each of {triangles} triangles"
+        );
     });
     assert_validation_clean(&device);
 }
@@ -170,7 +176,8 @@ fn gpu_kernel_pairs_with_alpha() {
     let mesh = |material| Mesh { name: name(), geometry: Geometry::Triangles(folded_quads()), material };
     scene.meshes = vec![mesh(masked), mesh(0)];
     let place = |mesh, object_to_world| Instance { name: name(), mesh, object_to_world };
-    scene.instances = vec![place(0, DAffine3::IDENTITY), place(1, DAffine3::from_translation(DVec3::new(0.05, 0.04, 0.06)))];
+    scene.instances =
+        vec![place(0, DAffine3::IDENTITY), place(1, DAffine3::from_translation(DVec3::new(0.05, 0.04, 0.06)))];
     let oracle = Oracle::new(&scene, scene.origin());
     let rays = rays_at(&oracle, 4);
     // a tracer that forgets the mask would be seen: many rays pass what it cuts away
@@ -217,7 +224,8 @@ fn gpu_kernel_pairs_of_bad_meshes() {
         let ray = OracleRay::from(ray);
         hit.is_hit() && lines.contains(&hit.primitive) && {
             let axis = ray.direction.abs().max_position();
-            let ends = oracle.triangles()[hit.primitive as usize].v.map(|v| (v - ray.origin)[axis] / ray.direction[axis]);
+            let ends =
+                oracle.triangles()[hit.primitive as usize].v.map(|v| (v - ray.origin)[axis] / ray.direction[axis]);
             let (lo, hi) = ends.into_iter().fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)));
             (lo - 1e-5..=hi + 1e-5).contains(&(hit.t as f64))
         }
@@ -242,7 +250,8 @@ fn comb(levels: i32, each: u32) -> TriangleMesh {
             let i = k as u32 * each + j;
             // a quarter turn at most keeps the diagonal a diagonal
             let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2 * (j % 4) as f64 + 0.3 * random(i, 0) - 0.15);
-            let (a, b) = (DVec3::new(-1.0, 0.3 + 0.1 * random(i, 1), -1.0), DVec3::new(0.3 + 0.1 * random(i, 2), -1.0, 1.0));
+            let (a, b) =
+                (DVec3::new(-1.0, 0.3 + 0.1 * random(i, 1), -1.0), DVec3::new(0.3 + 0.1 * random(i, 2), -1.0, 1.0));
             add([a, b, a.lerp(b, random(i, 3)) + DVec3::new(0.01, 0.01, 0.0)].map(|p| turn * p * size));
         }
     }
@@ -303,7 +312,8 @@ fn gpu_kernel_sets_of_any_size() {
     for mode in [Mode::Closest, Mode::Any] {
         let all = hits(&tracer, &rays, mode);
         assert!(all.iter().filter(|h| h.is_hit()).count() > all.len() / 4);
-        for count in [0, 1, 2, 7, 63, 64, 65, 127, 1023, 1024, 1025, 2047, 2049, 16_385, LAUNCH - 1, LAUNCH, LAUNCH + 1] {
+        for count in [0, 1, 2, 7, 63, 64, 65, 127, 1023, 1024, 1025, 2047, 2049, 16_385, LAUNCH - 1, LAUNCH, LAUNCH + 1]
+        {
             // from another place each time: rays and lanes go together in other ways
             let from = (count * 7919) % (rays.len() - count);
             let some = hits(&tracer, &rays[from..from + count], mode);

@@ -116,7 +116,9 @@ fn gpu_parity_far_from_the_origin() {
 fn gpu_parity_brute_force() {
     let device = device();
     let kernels = Kernel::ALL.map(|kernel| (TracerKind::Compute, kernel));
-    for (name, rays) in [("cornell-box", 60_000), ("cornell-spheres", 60_000), ("spheres:100", 40_000), ("grid:2", 30_000)] {
+    for (name, rays) in
+        [("cornell-box", 60_000), ("cornell-spheres", 60_000), ("spheres:100", 40_000), ("grid:2", 30_000)]
+    {
         gate_of(&device, name, &scene(name), rays.min(ray_count() / 3), &kernels);
     }
     gate_of(&device, "leaf-cards", &scene("leaf-cards"), 30_000.min(ray_count() / 3), &kernels);
@@ -192,7 +194,9 @@ fn gpu_nothing_leaks() {
         let oracle = Oracle::new(&scene, scene.origin());
         let rays = leak_rays(&oracle, ray_count() / 10, 7);
         let kernels = |kind| if kind == TracerKind::Compute { TREES.to_vec() } else { vec![Kernel::default()] };
-        for (kind, kernel) in tracers(&device).into_iter().flat_map(|kind| kernels(kind).into_iter().map(move |k| (kind, k))) {
+        for (kind, kernel) in
+            tracers(&device).into_iter().flat_map(|kind| kernels(kind).into_iter().map(move |k| (kind, k)))
+        {
             let flat = FlatScene::new(&scene);
             let tracer = Tracer::with_options(&device, kind, &flat, common::ALL, kernel).unwrap();
             let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut NoControl).unwrap();

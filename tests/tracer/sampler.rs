@@ -40,7 +40,8 @@ fn gpu_sampler_gives_the_hosts_bits() {
         let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
         let results = Buffer::new(&device, "probe outputs", 48 * count as u64, Memory::Readback).unwrap();
         let probe =
-            Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
+            Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }])
+                .unwrap();
         let push = Push { scene: tracer.scene_address(), pass: probe.address(), count, ..Default::default() };
         Commands::new(&device).unwrap().run(|r| stream.record(r, &push)).unwrap();
         let results = results.read(0, 48 * count as u64).unwrap();
@@ -67,7 +68,10 @@ fn gpu_sampler_gives_the_hosts_bits() {
             };
             worst_local = worst_local.max(worst(local, &got[4..7]));
             worst_world = worst_world.max(worst(world, &got[8..11]));
-            assert!(worst(local, &got[4..7]) <= 1e-6 && worst(world, &got[8..11]) <= 1e-6, "{kind}: probe {i}, {input:?}");
+            assert!(
+                worst(local, &got[4..7]) <= 1e-6 && worst(world, &got[8..11]) <= 1e-6,
+                "{kind}: probe {i}, {input:?}"
+            );
             same += (local.map(f32::to_bits) == got[4..7] && world.map(f32::to_bits) == got[8..11]) as u32;
         }
         println!(

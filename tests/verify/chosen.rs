@@ -145,7 +145,10 @@ fn gpu_what_was_chosen_does_not_follow_the_scene() {
     let old = verify(folder);
     assert_eq!(differing(&old), [""; 0]);
     let notes: Vec<&FrameResult> = old.frames.iter().filter(|f| f.note.is_some()).collect();
-    assert!(notes.len() == 1 && notes[0].frame == "path" && notes[0].note.as_ref().unwrap().contains("--light"), "{notes:?}");
+    assert!(
+        notes.len() == 1 && notes[0].frame == "path" && notes[0].note.as_ref().unwrap().contains("--light"),
+        "{notes:?}"
+    );
     export(folder, |scene| transform(scene, changes[0]));
     assert!(names(&differing(&verify(folder))).starts_with(&["ao", "share", "path"]));
 
@@ -157,7 +160,10 @@ fn gpu_what_was_chosen_does_not_follow_the_scene() {
     golden.image.metadata.push(("chosen".into(), "--eye nowhere".into()));
     golden.save().unwrap();
     let outcome = &verify(folder).frames[0].outcome;
-    assert!(matches!(outcome, Outcome::Failed(why) if why.contains("chosen") && why.contains("--bless")), "{outcome:?}");
+    assert!(
+        matches!(outcome, Outcome::Failed(why) if why.contains("chosen") && why.contains("--bless")),
+        "{outcome:?}"
+    );
 }
 
 fn small_box(at: DVec3, size: f64) -> skylit::scene::TriangleMesh {

@@ -101,7 +101,8 @@ fn gpu_planted_defects_are_found_and_noise_is_not() {
 
     // a mesh that is missing
     let mut scene = cornell();
-    let short = scene.instances.iter().position(|i| scene.meshes[i.mesh].name.contains("short")).expect("the short block");
+    let short =
+        scene.instances.iter().position(|i| scene.meshes[i.mesh].name.contains("short")).expect("the short block");
     scene.instances.remove(short);
     export(&scene, folder);
     let found = differing(&verify(folder));
@@ -157,7 +158,10 @@ fn gpu_planted_defects_are_found_and_noise_is_not() {
     assert!(judge(frame, &image, &golden).unwrap().holds());
     colours(&mut image, |samples, _| samples[333] = f32::NAN);
     let judgement = judge(frame, &image, &golden).unwrap();
-    assert!(!judgement.holds() && judgement.text().contains("1 pixel with values that are not finite"), "{judgement:?}");
+    assert!(
+        !judgement.holds() && judgement.text().contains("1 pixel with values that are not finite"),
+        "{judgement:?}"
+    );
 
     // the tone map of another curve
     let frame = manifest.frames.iter().find(|f| f.name == "picture").unwrap();

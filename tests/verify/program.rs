@@ -35,7 +35,9 @@ fn text(path: &Path) -> &str {
 fn a_manifest_of_ten_thousand_frames() {
     let frame = |k: usize| {
         let scene = if k.is_multiple_of(2) { "builtin:none".to_owned() } else { format!("missing-{k}.glb") };
-        format!("[[frame]]\nname = \"frame-{k}\"\nscene = \"{scene}\"\nrender = \"ao --spp 4\"\ntolerance = \"z_test\"\n")
+        format!(
+            "[[frame]]\nname = \"frame-{k}\"\nscene = \"{scene}\"\nrender = \"ao --spp 4\"\ntolerance = \"z_test\"\n"
+        )
     };
     let dir = folder(&(0..10_000).map(frame).collect::<String>());
     let [junit, page] = ["a.xml", "page"].map(|name| dir.path().join(name));
@@ -100,7 +102,8 @@ fn manifests_that_are_wrong_name_the_line() {
 #[test]
 fn options_that_have_no_effect() {
     let dir = folder(TWO);
-    let refuse = |options: &[&str], says: &str| fails(&run(&[&["verify", text(dir.path())], options].concat()), 64, &[says]);
+    let refuse =
+        |options: &[&str], says: &str| fails(&run(&[&["verify", text(dir.path())], options].concat()), 64, &[says]);
     refuse(&["--force"], "--force is for --bless");
     refuse(&["--bless", "--update-missing"], "--update-missing");
     refuse(&["--bless", "--seed", "3"], "--seed has no effect");
@@ -207,8 +210,9 @@ fn gpu_golden_images_are_made_and_compared() {
 
     // nothing is pinned; nothing of this name
     fails(&verify(&["--bless"]), 64, &["no driver is pinned", "--force"]);
-    let pin =
-        |driver: &str| std::fs::write(path.join("frames.toml"), format!("[drivers]\npinned = [{driver:?}]\n{TWO}")).unwrap();
+    let pin = |driver: &str| {
+        std::fs::write(path.join("frames.toml"), format!("[drivers]\npinned = [{driver:?}]\n{TWO}")).unwrap()
+    };
     pin("a driver of the past");
     fails(&verify(&["--update-missing"]), 64, &["which is not pinned", "a driver of the past"]);
     assert!(!path.join("plane.exr").exists());
@@ -229,7 +233,9 @@ fn gpu_golden_images_are_made_and_compared() {
     assert!(outcomes.len() == 2 && outcomes.iter().all(|f| f["outcome"]["holds"].is_array()), "{all}");
     let xml = std::fs::read_to_string(&junit).unwrap();
     assert!(xml.contains("tests=\"2\"") && xml.contains("failures=\"0\"") && xml.contains("stairs ("), "{xml}");
-    let part = |i: usize| json(&verify(&["--json", "--seed", "9", "--shard", &format!("{i}/2")]))["frames"][0]["frame"].clone();
+    let part = |i: usize| {
+        json(&verify(&["--json", "--seed", "9", "--shard", &format!("{i}/2")]))["frames"][0]["frame"].clone()
+    };
     assert_eq!([part(1), part(2)], ["plane", "stairs"]);
     let out = verify(&[]);
     assert!(out.status.success(), "{}", stderr(&out));
@@ -238,7 +244,10 @@ fn gpu_golden_images_are_made_and_compared() {
 
     // the same again is the same; other settings are not
     let again = json(&verify(&["--bless", "--json"]));
-    assert!(again["frames"].as_array().unwrap().iter().all(|f| f["outcome"]["blessed"]["change"] == "unchanged"), "{again}");
+    assert!(
+        again["frames"].as_array().unwrap().iter().all(|f| f["outcome"]["blessed"]["change"] == "unchanged"),
+        "{again}"
+    );
     let manifest = std::fs::read_to_string(path.join("frames.toml")).unwrap();
     std::fs::write(path.join("frames.toml"), manifest.replace("radius 2", "radius 0.2")).unwrap();
     fails(&verify(&["--junit", text(&junit)]), 2, &["1 frame could not be judged: stairs"]);

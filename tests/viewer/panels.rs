@@ -187,11 +187,20 @@ fn every_control_has_a_name() {
     }
     use egui::accesskit::Role;
     let names = |role: Role| {
-        alone.harness.query_all_by_role(role).map(|n| (n.accesskit_node().label().unwrap_or_default(), format!("{n:?}")))
+        alone
+            .harness
+            .query_all_by_role(role)
+            .map(|n| (n.accesskit_node().label().unwrap_or_default(), format!("{n:?}")))
     };
-    for role in
-        [Role::Button, Role::CheckBox, Role::Slider, Role::SpinButton, Role::ComboBox, Role::TextInput, Role::RadioButton]
-    {
+    for role in [
+        Role::Button,
+        Role::CheckBox,
+        Role::Slider,
+        Role::SpinButton,
+        Role::ComboBox,
+        Role::TextInput,
+        Role::RadioButton,
+    ] {
         for (name, node) in names(role) {
             assert!(!name.trim().is_empty(), "{role:?} without a name: {node}");
         }
@@ -604,7 +613,8 @@ fn another_scene_starts_afresh() {
         app.playback.animation = Some(1);
     });
     alone.change(|app| app.open("builtin:cornell-box"));
-    let summary = SceneSummary { load: 2, is_complete: true, source: "builtin:cornell-box".into(), ..Default::default() };
+    let summary =
+        SceneSummary { load: 2, is_complete: true, source: "builtin:cornell-box".into(), ..Default::default() };
     alone.events.send(Event::Loaded(Box::new(summary)));
     alone.harness.run_steps(2);
     let request = alone.mailbox.peek();

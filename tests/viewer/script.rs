@@ -110,8 +110,15 @@ expect-no-errors";
     let text: Vec<&str> = text.lines().collect();
     let text = if available.len() == 3 { text.join("\n") } else { "wait picture 500\nexpect-no-errors".into() };
     let sections = run(Some("builtin:cornell-box"), folder.path(), &text).unwrap();
-    assert!(sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(), "{sections:?}");
-    assert_eq!(folder.path().join("query.png").exists(), available.len() == 3, "what is to be saved waits for an image");
+    assert!(
+        sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(),
+        "{sections:?}"
+    );
+    assert_eq!(
+        folder.path().join("query.png").exists(),
+        available.len() == 3,
+        "what is to be saved waits for an image"
+    );
 }
 
 /// A scene whose image does not arrive before it is seen without it: a pipe. When the image is replaced on disk the scene is loaded anew.
@@ -184,7 +191,10 @@ fn gpu_black_views_are_left() {
         width: 4,
         height: 2,
         channels: ["R", "G", "B"]
-            .map(|name| skylit::output::Channel { name: name.into(), samples: skylit::output::Samples::F32(vec![0.5; 8]) })
+            .map(|name| skylit::output::Channel {
+                name: name.into(),
+                samples: skylit::output::Samples::F32(vec![0.5; 8]),
+            })
             .to_vec(),
         metadata: Vec::new(),
     };

@@ -30,8 +30,9 @@ fn gpu_views_at_rest_are_what_render_makes() {
     for kind in tracers(&device()) {
         let mut renderer = renderer("stairs", kind.name());
         let camera = renderer.scene().cameras[0].clone();
-        let frames =
-            settings(serde_json::json!({ "image": { "size": SIZE }, "frames": { "preset": "fast", "frames": "0..5" } }));
+        let frames = settings(
+            serde_json::json!({ "image": { "size": SIZE }, "frames": { "preset": "fast", "frames": "0..5" } }),
+        );
         let mut sequence = renderer.frames(&frames, true, &mut NoControl).unwrap();
         while sequence.advance().unwrap().is_some() {}
         let expected = sequence.displayed().unwrap().read(0, u64::from(4 * SIZE[0] * SIZE[1])).unwrap();
@@ -106,8 +107,7 @@ fn gpu_every_technique_has_a_picture() {
         let mut session = renderer.interactive(&Default::default(), None).unwrap();
         for (_, technique) in Technique::all() {
             // compiling the kernels of paths takes most of the time: tests/path has them on all tracers
-            let is_path =
-                matches!(technique, Technique::Still(i) | Technique::Frames(i) if i.name() != "ao" && i.name() != "ao-sky");
+            let is_path = matches!(technique, Technique::Still(i) | Technique::Frames(i) if i.name() != "ao" && i.name() != "ao-sky");
             if is_path && kind != tracers(&device())[0] {
                 continue;
             }
@@ -170,7 +170,8 @@ fn gpu_animations_are_those_of_render() {
     };
     let (moments, end, after) = ([0.0, 0.625].map(&mut held), held(2.0), held(5.0));
     assert!(moments[0] != moments[1] && end == after, "after its end an animation holds its last pose");
-    let still = serde_json::json!({ "integrator": "ao", "image": { "size": SIZE, "spp": 1 }, "frames": { "time": 0.625 } });
+    let still =
+        serde_json::json!({ "integrator": "ao", "image": { "size": SIZE, "spp": 1 }, "frames": { "time": 0.625 } });
     let still = renderer.still_sequence(&settings(still)).unwrap().render(0, &mut NoControl).unwrap().image;
     let mut session = renderer.interactive(&Default::default(), Some(0)).unwrap();
     let preset = settings(serde_json::json!({ "frames": { "preset": "fast" } }));

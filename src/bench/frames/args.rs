@@ -191,7 +191,8 @@ impl BenchFramesArgs {
         if !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames) {
             return Err(Error::Usage(format!("--integrator {name}: it has no frames in real time")));
         }
-        let for_occlusion = |what: String| Err(Error::Usage(format!("{what}: it is for ambient occlusion (--integrator ao)")));
+        let for_occlusion =
+            |what: String| Err(Error::Usage(format!("{what}: it is for ambient occlusion (--integrator ao)")));
         let is_foreign = |n: &&String| Candidate::find(n).is_some_and(|c| !self.has(c));
         if let Some(preset) = self.presets.iter().find(is_foreign) {
             return for_occlusion(format!("--presets {preset}"));
@@ -311,7 +312,9 @@ mod tests {
     #[test]
     fn parts_by_what_is_named() {
         let all = parse(&[]);
-        assert!(all.wants(Part::Still) && all.wants(Part::Sun) && all.wants(Part::Bounces) && all.wants(Part::Structures));
+        assert!(
+            all.wants(Part::Still) && all.wants(Part::Sun) && all.wants(Part::Bounces) && all.wants(Part::Structures)
+        );
         assert!(!parse(&["a.glb"]).wants(Part::Bounces) && parse(&["a.glb"]).wants(Part::Change));
         assert!(!parse(&["a.glb"]).wants(Part::Structures) && !all.wants(Part::EqualTime));
         let some = parse(&["--parts", "bounces"]);

@@ -292,7 +292,8 @@ impl Lag {
         let all = share(shown_before, settled, &mut Ghosting::default());
         let mut ghosting = Ghosting::default();
         let left = images.iter().map(|image| share(image, settled, &mut ghosting) / all).collect();
-        let of_that_age = |(image, fresh): (&Displayed, &Displayed)| share(image, fresh, &mut Ghosting::default()) / all;
+        let of_that_age =
+            |(image, fresh): (&Displayed, &Displayed)| share(image, fresh, &mut Ghosting::default()) / all;
         let memory = images.iter().zip(fresh).map(of_that_age).collect();
         Self { left: LagCurve::new(left), memory: LagCurve::new(memory), ghosting: ghosting.energy() }
     }

@@ -23,7 +23,8 @@ pub fn first_timed(frames: u32) -> usize {
 /// Frames whose error is measured: in the second half of a sequence, the last included.
 pub fn measured(frames: u32) -> Vec<u32> {
     let half = frames / 2;
-    let mut at: Vec<u32> = (1..=REFERENCES).map(|k| frames - half + half * k / REFERENCES).map(|end| end.max(1) - 1).collect();
+    let mut at: Vec<u32> =
+        (1..=REFERENCES).map(|k| frames - half + half * k / REFERENCES).map(|end| end.max(1) - 1).collect();
     at.dedup();
     at
 }
@@ -144,8 +145,9 @@ impl FrameLog {
 
     /// Device seconds of each frame, or by the clock where the device has none.
     pub fn seconds(&self) -> Vec<f64> {
-        let seconds =
-            |l: &TimedFrame| if l.stats.timings.is_empty() { l.wall } else { l.stats.timings.iter().map(|t| t.seconds).sum() };
+        let seconds = |l: &TimedFrame| {
+            if l.stats.timings.is_empty() { l.wall } else { l.stats.timings.iter().map(|t| t.seconds).sum() }
+        };
         self.frames.iter().map(seconds).collect()
     }
 
@@ -162,7 +164,8 @@ impl FrameLog {
             if let Some((_, typical)) = kinds.iter().find(|k| k.0 == samples) {
                 return *typical;
             }
-            let alike = |from: usize| self.frames.iter().skip(from).filter(|f| f.stats.samples == samples).collect::<Vec<_>>();
+            let alike =
+                |from: usize| self.frames.iter().skip(from).filter(|f| f.stats.samples == samples).collect::<Vec<_>>();
             let late = alike(first);
             let cost = cost_of(&if late.is_empty() { alike(0) } else { late });
             let paths = f64::from(samples) / cost.sampling_share().unwrap_or(1.0);
@@ -178,8 +181,9 @@ fn cost_of(frames: &[&TimedFrame]) -> FrameCost {
     let ms = |values: &mut dyn Iterator<Item = f64>| {
         Percentiles::from_values(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
     };
-    let mean =
-        |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;
+    let mean = |of: fn(&FrameStats) -> u64| {
+        frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64
+    };
     // steps and launches of a pass belong together: "PASS STEP"
     let mut passes: Vec<&str> = Vec::new();
     for label in frames.iter().flat_map(|l| &l.stats.timings).map(|t| pass(t.label)) {

@@ -54,7 +54,8 @@ pub fn remarks(results: &[StillResult]) -> Vec<String> {
         });
     }
     let raised: Vec<&str> = results.iter().filter(raises).map(|r| r.candidate.name).collect();
-    lines.extend((!raised.is_empty()).then(|| format!("the filter raises the settled error of: {}", raised.join(", "))));
+    lines
+        .extend((!raised.is_empty()).then(|| format!("the filter raises the settled error of: {}", raised.join(", "))));
     lines
 }
 
@@ -145,7 +146,10 @@ mod tests {
         let ours = result("balanced", 100.0, 0.0, &[0.3, 0.05, 0.02, 0.01], 0.02);
         let theirs = result("larsen", 1600.0, 100.0, &[0.05, 0.04], 0.03);
         let lines = remarks(&[ours, theirs]);
-        assert!(lines[0].contains("0.062 of the rays (0.059 with camera rays, 0.118 while moving), 0.250 of"), "{lines:?}");
+        assert!(
+            lines[0].contains("0.062 of the rays (0.059 with camera rays, 0.118 while moving), 0.250 of"),
+            "{lines:?}"
+        );
         assert!(lines[0].ends_with("yes") && lines[1].contains("in frame 3, after 300 rays: 0.188 of"), "{lines:?}");
         // theirs is worse with its box than without
         assert_eq!(lines[2], "the filter raises the settled error of: larsen");

@@ -38,7 +38,9 @@ pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut 
         let reference = stage.reference(&camera, paths)?;
         let before = match before {
             None => None,
-            Some((old, surfaces)) => Some((old, surface_masks::unchanged(&stage.surfaces(&camera)?, &surfaces, stage.reach))),
+            Some((old, surfaces)) => {
+                Some((old, surface_masks::unchanged(&stage.surfaces(&camera)?, &surfaces, stage.reach)))
+            }
         };
         moments.push(Moment { frame, reference, before });
     }

@@ -74,7 +74,8 @@ pub fn render_beside(
                 for (frame, image) in rendered {
                     let mut at = row.at(FRAME, f64::from(frame));
                     at.exact(quantity::RMSE.not_compared(), image.errors.rmse);
-                    at.exact(quantity::CORRECTED, image.errors.corrected).exact(plain("paths", ""), f64::from(image.paths));
+                    at.exact(quantity::CORRECTED, image.errors.corrected)
+                        .exact(plain("paths", ""), f64::from(image.paths));
                 }
                 all.push(images);
             }

@@ -51,7 +51,8 @@ pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -
         session.advance(k as f64 / sources.len() as f64);
         session.phase(format!("{source}: loading"));
         let loaded = scenes::load(source, args)?;
-        let flat = FlatScene::with_motion_and_blend(&loaded.scene, Default::default(), args.integrator().get().blend())?;
+        let flat =
+            FlatScene::with_motion_and_blend(&loaded.scene, Default::default(), args.integrator().get().blend())?;
         let Some(view) = loaded.views.first() else { continue };
         let sizes: &[[u32; 2]] = if args.common.quick { &QUICK_SIZES } else { &SIZES };
         let sizes = if series == Series::Resolution { sizes.to_vec() } else { vec![args.size()] };

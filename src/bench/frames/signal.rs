@@ -16,7 +16,9 @@ use crate::raster::Primary;
 use crate::realtime::frame_settings::Antialias;
 use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings, Technique};
 use crate::renderer::RenderSettings;
-use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
+use crate::renderer::frames::{
+    frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline,
+};
 use crate::scene::{Camera, Scene};
 use crate::settings::{Capability, Length};
 use crate::shaders::StreamShaders;

@@ -91,7 +91,8 @@ pub struct DenoisedImage {
 impl DenoisedImage {
     /// Adds it to the row of the preset.
     pub fn add_to(&self, row: &mut Row) {
-        row.exact(plain("oidn RMSE", ""), self.errors.rmse).exact(plain("corrected oidn RMSE", ""), self.errors.corrected);
+        row.exact(plain("oidn RMSE", ""), self.errors.rmse)
+            .exact(plain("corrected oidn RMSE", ""), self.errors.corrected);
         row.exact(plain("oidn paths", ""), f64::from(self.paths)).exact(plain("oidn time", "ms"), self.ms);
     }
 }
@@ -262,7 +263,12 @@ impl<'a> Stage<'a> {
     }
 
     /// The last of some frames, all with new camera rays: the camera moves by under 0.001 pixels.
-    pub fn jittered_frames(&self, candidate: &Candidate, settings: Settings, frames: u32) -> Result<(Vec<f32>, FrameLog)> {
+    pub fn jittered_frames(
+        &self,
+        candidate: &Candidate,
+        settings: Settings,
+        frames: u32,
+    ) -> Result<(Vec<f32>, FrameLog)> {
         let mut realtime = self.realtime_with(candidate, settings)?;
         let (mut log, camera) = (FrameLog::default(), self.still_camera());
         for frame in 0..frames {
@@ -297,7 +303,8 @@ impl<'a> Stage<'a> {
 
     /// A converged image of what the scene is now.
     pub fn reference(&mut self, camera: &CameraRecord, paths: u32) -> Result<FrameReference> {
-        let mut half = |seed| Ok::<_, crate::Error>(self.sampler.render(&self.tracer, camera, paths.div_ceil(2), seed)?.0);
+        let mut half =
+            |seed| Ok::<_, crate::Error>(self.sampler.render(&self.tracer, camera, paths.div_ceil(2), seed)?.0);
         let [a, b] = REFERENCE_SEEDS.map(&mut half);
         // of ambient visibility only pixels count that show something
         let mask = if self.channels() == 1 {
@@ -377,8 +384,12 @@ mod tests {
 
     #[test]
     fn a_jittered_camera_moves_by_next_to_nothing() {
-        let camera =
-            CameraRecord { camera_to_world: [[0.0; 4]; 3], view: [0.7, 0.4], orthographic: false, clip: [0.0, f32::INFINITY] };
+        let camera = CameraRecord {
+            camera_to_world: [[0.0; 4]; 3],
+            view: [0.7, 0.4],
+            orthographic: false,
+            clip: [0.0, f32::INFINITY],
+        };
         let moved = jittered(&camera, 1);
         assert!(moved != camera && jittered(&camera, 2) == camera);
         // pixels, at the border of a wide image

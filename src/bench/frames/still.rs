@@ -149,7 +149,8 @@ fn add_remarks(
     remarks.extend(over_plain.map(|ratio| plain_remark(candidate.name, PART, ratio)));
     remarks.extend(flicker.map(|f| {
         let limit = Flicker::LIMIT;
-        let below = f.is_invisible().map_or_else(String::new, |yes| format!("; below 1/255 = {limit:.5}: {}", yes_or_no(yes)));
+        let below =
+            f.is_invisible().map_or_else(String::new, |yes| format!("; below 1/255 = {limit:.5}: {}", yes_or_no(yes)));
         format!("{}: flicker after {} frames {:.5} (worst {:.5}){below}", candidate.name, f.after, f.rms, f.greatest)
     }));
 }

@@ -72,7 +72,8 @@ fn measure_scene(session: &mut FramesSession, source: &str) -> Result<()> {
     let [refits, rebuilds] = [false, true].map(|rebuild| deform(&mut tracer, &poses, repeats, rebuild));
     let [refits, rebuilds] = [refits?, rebuilds?];
     if rebuilds.is_empty() {
-        session.note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
+        session
+            .note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
     }
 
     // all of it into the record

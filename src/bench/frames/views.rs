@@ -36,8 +36,9 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
     let scene = &loaded.scene;
     let has_animation = scene.rig.as_ref().is_some_and(|rig: &AnimationRig| !rig.animations().is_empty());
     let animation = (has_animation && args.wants(Part::Animation)).then_some(0);
-    let sequence =
-        |view: &View| FrameSequence::new(scene, view.camera.clone(), None, CameraMotion::Still, animation, FRAMES_PER_SECOND);
+    let sequence = |view: &View| {
+        FrameSequence::new(scene, view.camera.clone(), None, CameraMotion::Still, animation, FRAMES_PER_SECOND)
+    };
     let motion = match loaded.mover {
         Some(mover) => scene::Motion { instances: vec![mover.instance], meshes: Vec::new() },
         None => loaded.views.first().map(sequence).transpose()?.map_or(Ok(scene::Motion::default()), |s| s.motion())?,

@@ -36,7 +36,13 @@ impl<'a> Contestant<'a> {
     }
 
     /// Renders an image and measures it, also in the warming round, whose seeds are its own.
-    pub fn render(&mut self, peers: &mut [Peer], round: u32, spp: u32, references: &[PathReference]) -> Result<(), PeerError> {
+    pub fn render(
+        &mut self,
+        peers: &mut [Peer],
+        round: u32,
+        spp: u32,
+        references: &[PathReference],
+    ) -> Result<(), PeerError> {
         let image = self.engine.render(peers, spp, 1 + round)?;
         let reference = &references[self.reference];
         let pair = ImagePair::new(&image.rgb, &reference.image, 3, None)?;
@@ -75,8 +81,9 @@ impl<'a> Contestant<'a> {
                 let squares = mean(&l.squares);
                 let is_unsure = squares < 4.0 * reference_mse;
                 let reference_rmse = references[self.reference].rmse;
-                let error =
-                    |squares: f64| if is_unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) };
+                let error = |squares: f64| {
+                    if is_unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) }
+                };
                 ErrorPoint {
                     spp: l.spp,
                     seconds: l.seconds.clone(),

@@ -108,7 +108,9 @@ impl ErrorCurve {
 
     fn add_time_to_target(&self, row: &mut Row, target: Option<&ErrorCurve>) {
         let Some(target) = target else { return };
-        let Some(rmse) = target.points.last().map(|p| p.rmse).filter(|rmse| *rmse > 0.0 && rmse.is_finite()) else { return };
+        let Some(rmse) = target.points.last().map(|p| p.rmse).filter(|rmse| *rmse > 0.0 && rmse.is_finite()) else {
+            return;
+        };
         let Some(time) = self.time_to(rmse) else { return };
         let name = match time.estimate {
             TimeEstimate::Between => "time to the target",

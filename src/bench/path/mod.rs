@@ -80,12 +80,14 @@ impl PathSession<'_> {
         let flat = FlatScene::for_paths(&loaded.scene);
         let camera = CameraRecord::new(&loaded.camera, flat.origin, aspect);
         let paths = u64::from(size[0]) * u64::from(size[1]) * 4096;
-        let build = BuildOptions { preset: args.build.preset(), rays: paths, cache: None, streams: path::streams().to_vec() };
+        let build =
+            BuildOptions { preset: args.build.preset(), rays: paths, cache: None, streams: path::streams().to_vec() };
         let needs = Needs { shading: true, ..Default::default() };
         let (kind, _) = args.tracer.on(self.device.info());
         let tracer = self.device.tracer(&flat, kind, needs, ComputeOptions::default(), &build)?;
         let own = |strategy| -> Result<Engine> {
-            let options = PathOptions { samples: SampleSettings::new(size, MAX_SPP, 0), strategy, ..PathOptions::default() };
+            let options =
+                PathOptions { samples: SampleSettings::new(size, MAX_SPP, 0), strategy, ..PathOptions::default() };
             Engine::own(&tracer, &flat, camera, &options)
         };
         let mut engine = own(path::Strategy::Mis)?;
@@ -171,7 +173,13 @@ impl PathSession<'_> {
     }
 
     /// Renders the reference of an engine, after so many others.
-    fn reference(&mut self, scene: &str, name: &str, done: usize, engine: &mut Engine) -> Result<PathReference, PeerError> {
+    fn reference(
+        &mut self,
+        scene: &str,
+        name: &str,
+        done: usize,
+        engine: &mut Engine,
+    ) -> Result<PathReference, PeerError> {
         self.phase(format!("{scene}: reference of {name}"));
         let limit = self.args.reference_seconds();
         // ours, and one of each peer
@@ -195,17 +203,18 @@ impl PathSession<'_> {
                 for contestant in contestants.iter_mut() {
                     let wanted = match round {
                         // those whose last image was short go on; a curve has two points
-                        0 => contestant
-                            .by_spp
-                            .last()
-                            .is_none_or(|l| l.spp * STEP == spp && (l.spp == 1 || 2.0 * l.seconds[0] < self.args.seconds())),
+                        0 => contestant.by_spp.last().is_none_or(|l| {
+                            l.spp * STEP == spp && (l.spp == 1 || 2.0 * l.seconds[0] < self.args.seconds())
+                        }),
                         _ => contestant.by_spp.iter().any(|l| l.spp == spp),
                     };
                     if !wanted {
                         continue;
                     }
                     going = true;
-                    contestant.render(&mut self.peers, round, spp, references).map_err(|e| e.into_error(&contestant.name))?;
+                    contestant
+                        .render(&mut self.peers, round, spp, references)
+                        .map_err(|e| e.into_error(&contestant.name))?;
                 }
                 spp *= STEP;
             }

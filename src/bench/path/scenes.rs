@@ -74,7 +74,8 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene
     let known = WellKnownScene::find(&FILES, source);
     let is_emissive = |m: &Mesh| scene.materials[m.material].emissive != Vec3::ZERO;
     let lamp = known.and_then(|k| k.area_light);
-    let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !scene.meshes.iter().any(is_emissive);
+    let dark =
+        scene.environment == Environment::Black && scene.lights.is_empty() && !scene.meshes.iter().any(is_emissive);
     // a sky that does not reach a room would take most of the light samples
     if (dark && lamp.is_none()) || args.environment.is_some() {
         scene.environment = Environment::Map(sun_map(args.environment.as_deref(), args.common.quick)?);

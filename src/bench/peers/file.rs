@@ -114,9 +114,13 @@ pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
         let peer = PeerSpec { folder: folder.clone(), ..entry.into_inner() };
         let word = |s: &String| !s.is_empty() && !s.contains(char::is_whitespace);
         let unknown = peer.baselines.iter().chain(&peer.strict).find(|b| !peer.kernels.contains(b));
-        let is_below = |path: &PathBuf| path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let is_below =
+            |path: &PathBuf| path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let problem = if !is_plain_name(&peer.name) {
-            Some(format!("`name = {:?}`: a peer's name is one word of letters, digits, `.`, `_`, `+` and `-`", peer.name))
+            Some(format!(
+                "`name = {:?}`: a peer's name is one word of letters, digits, `.`, `_`, `+` and `-`",
+                peer.name
+            ))
         } else if let Some(source) = peer.sources.iter().find(|s| !is_below(s)) {
             Some(format!("peer `{}`: the source {source:?} is not below the folder of this file", peer.name))
         } else if peers.iter().any(|p| p.name == peer.name) {
@@ -186,7 +190,8 @@ impl PeerSpec {
             crate::files::read_regular(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
         }
         // a folder that others can write to holds no programs of ours
-        let cache = crate::files::cache_folder().ok_or("there is no folder to build it in: set HOME or XDG_CACHE_HOME")?;
+        let cache =
+            crate::files::cache_folder().ok_or("there is no folder to build it in: set HOME or XDG_CACHE_HOME")?;
         Ok(cache.join("peers").join(format!("{}-{:016x}", self.name, hash.finish())))
     }
 
@@ -274,8 +279,10 @@ mod tests {
         assert!(error_of(&format!("{peer}baselines = ['x']\n")).contains("`x` is not among its kernels"));
         for name in ["../a", "a/b", ".a", "a\u{1b}[31m"] {
             assert!(
-                error_of(&format!("[[peer]]\nname = {name:?}\nrun = ['a']\nkernels = ['k']\n").replace("\\u{1b}", "\\u001b"))
-                    .contains("one word")
+                error_of(
+                    &format!("[[peer]]\nname = {name:?}\nrun = ['a']\nkernels = ['k']\n").replace("\\u{1b}", "\\u001b")
+                )
+                .contains("one word")
             );
         }
         assert!(error_of(&format!("{peer}sources = ['../../x']\n")).contains("not below"));

@@ -118,8 +118,8 @@ impl Peer {
                 }
             }
         };
-        let value: Value =
-            serde_json::from_str(&line).map_err(|_| PeerError::Failed(format!("its answer is not JSON: {line:.80}")))?;
+        let value: Value = serde_json::from_str(&line)
+            .map_err(|_| PeerError::Failed(format!("its answer is not JSON: {line:.80}")))?;
         match value["error"].as_str() {
             Some(e) => Err(PeerError::Failed(format!("it reports: {e}"))),
             None => Ok(value),

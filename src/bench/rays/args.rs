@@ -159,6 +159,8 @@ mod tests {
         );
         assert_eq!(parse(&["--json", "A.JSON", "scene"]).common.outputs.json_file().unwrap(), Path::new("A.JSON"));
         // a record takes no scene's place
-        assert!(Alone::try_parse_from(["bench", "--json", "scene.glb"]).unwrap_err().to_string().contains("ends in .json"));
+        assert!(
+            Alone::try_parse_from(["bench", "--json", "scene.glb"]).unwrap_err().to_string().contains("ends in .json")
+        );
     }
 }

@@ -45,7 +45,8 @@ impl Check {
     /// Adds the counts to the record.
     pub fn add_to(&self, record: &mut Record) {
         let mut row = record.row(&self.scene, &format!("answers, {}", self.stream), &self.contestant);
-        let counts = [("compared", self.rays), ("agree", self.agree), ("ties", self.ties), ("unexplained", self.unexplained)];
+        let counts =
+            [("compared", self.rays), ("agree", self.agree), ("ties", self.ties), ("unexplained", self.unexplained)];
         counts.into_iter().for_each(|(name, count)| {
             row.exact(plain(name, ""), count as f64);
         });

@@ -35,7 +35,13 @@ pub const KERNELS: [OwnKernel; 7] = [
     compute(Kernel::Nearest, "nearest", 4, 1 << 22),
     compute(Kernel::Direction, "direction", 4, 1 << 22),
     compute(Kernel::Brute, "brute", 64, 2000),
-    OwnKernel { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 },
+    OwnKernel {
+        name: "pipeline",
+        tracer: TracerKind::Pipeline,
+        kernel: Kernel::Wide,
+        divisor: 16,
+        max_primitives: 1 << 21,
+    },
     OwnKernel { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 },
 ];
 
@@ -47,7 +53,9 @@ impl OwnKernel {
         }
         if self.kernel == Kernel::Packet && !info.packets() {
             // it would be `wide` under another name
-            return Err("the device has no subgroups of eight lanes or no 64-bit integers, and traces as 'wide' does".into());
+            return Err(
+                "the device has no subgroups of eight lanes or no 64-bit integers, and traces as 'wide' does".into()
+            );
         }
         // without a tree, a GPU is slow too, and what is placed counts, not what is stored
         let brute = self.kernel == Kernel::Brute;
@@ -121,7 +129,13 @@ impl<'a> Contestant<'a> {
             sah_cost: None,
         };
         let strict = peer.spec.strict.iter().any(|k| k == kernel);
-        Ok(Self { name, build, strict, kernel: None, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
+        Ok(Self {
+            name,
+            build,
+            strict,
+            kernel: None,
+            engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat },
+        })
     }
 
     /// Is it made for such rays? Packets are for coherent ones alone.
@@ -159,7 +173,13 @@ impl<'a> Contestant<'a> {
     }
 
     /// Traces rays without timing and returns their hits.
-    pub fn hits(&self, peers: &mut [Peer], rays: &[Ray], mode: Mode, control: &mut dyn Control) -> Result<Vec<Hit>, PeerError> {
+    pub fn hits(
+        &self,
+        peers: &mut [Peer],
+        rays: &[Ray],
+        mode: Mode,
+        control: &mut dyn Control,
+    ) -> Result<Vec<Hit>, PeerError> {
         match &self.engine {
             Engine::Own { tracer, .. } => {
                 let mut prepared = PreparedRays::new(tracer, rays, mode)?;

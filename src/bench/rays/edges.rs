@@ -66,8 +66,9 @@ impl RaySession<'_> {
         scenes.extend(hard_leak_scenes(HARD.0, HARD.1));
         let each = (self.args.edge_rays() / scenes.len()).max(1);
         self.expect_jobs(scenes.len());
-        let sent =
-            scenes.iter().try_for_each(|(name, scene)| self.job(name, |session| session.edges_of(name, scene, each, found)));
+        let sent = scenes
+            .iter()
+            .try_for_each(|(name, scene)| self.job(name, |session| session.edges_of(name, scene, each, found)));
         // what there is, also where it failed
         found.iter().for_each(|counts| counts.add_to(&mut self.record));
         sent.and(self.show_scene(SCENE))

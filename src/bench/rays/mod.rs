@@ -150,7 +150,8 @@ impl RaySession<'_> {
     fn scene(&mut self, source: &str, findings: &mut Findings) -> Result<()> {
         let size = self.args.size();
         self.phase(format!("{source}: loading"));
-        let loaded = scenes::load(source, self.args.alpha, self.args.ao_radius, f64::from(size[0]) / f64::from(size[1]))?;
+        let loaded =
+            scenes::load(source, self.args.alpha, self.args.ao_radius, f64::from(size[0]) / f64::from(size[1]))?;
         self.note_warnings(source, &loaded.scene);
         if let Some(known) = loaded.well_known {
             self.note(format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));
@@ -213,8 +214,9 @@ impl RaySession<'_> {
             for run in &runs {
                 let mut row = self.record.row(source, stream.name, &run.name).of_peer(run.is_peers);
                 let mut row = row.at(SIZE, size);
-                let rates =
-                    |seconds: &[f64]| Percentiles::from_values(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>());
+                let rates = |seconds: &[f64]| {
+                    Percentiles::from_values(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>())
+                };
                 row.repeated(quantity::RATE, rates(&run.seconds));
                 row.repeated(plain("wall rate", "Mrays/s"), run.wall_seconds.as_deref().and_then(rates));
                 row.exact(plain("traced", "rays"), run.rays).exact(plain("hit share", ""), run.hit_share);

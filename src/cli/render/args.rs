@@ -138,7 +138,9 @@ impl RenderArgs {
                 ));
             }
         } else if self.continues {
-            return wrong("--continue is for stills of several frames: add --frames A..B and --spp N, or leave it out".into());
+            return wrong(
+                "--continue is for stills of several frames: add --frames A..B and --spp N, or leave it out".into(),
+            );
         }
 
         // options of stills alone
@@ -151,7 +153,10 @@ impl RenderArgs {
             (self.dump_rays.is_some(), "--dump-rays", "leave it out"),
         ];
         if let (Some(frames), Some((_, option, remedy))) = (frames, of_stills.iter().find(|o| o.0)) {
-            return wrong(format!("{option} is for stills, and {} selects frames in real time: {remedy}", frames.option()));
+            return wrong(format!(
+                "{option} is for stills, and {} selects frames in real time: {remedy}",
+                frames.option()
+            ));
         }
 
         // options that need a certain integrator or channel
@@ -200,9 +205,10 @@ impl RenderArgs {
             return wrong("--resumable needs an .exr output: pictures hold colour only".into());
         }
         match &film.resume {
-            Some(path) if ImageFormat::from_path(path).ok() != Some(ImageFormat::Exr) => {
-                wrong(format!("--resume {}: only an .exr that was rendered with --resumable can be resumed", path.display()))
-            }
+            Some(path) if ImageFormat::from_path(path).ok() != Some(ImageFormat::Exr) => wrong(format!(
+                "--resume {}: only an .exr that was rendered with --resumable can be resumed",
+                path.display()
+            )),
             _ => Ok(()),
         }
     }

@@ -74,10 +74,9 @@ impl FrameFiles {
         }
         for path in &self.pictures {
             let path = frames::numbered(path, number)?;
-            let deep = contents
-                .deep
-                .as_ref()
-                .filter(|_| self.settings.has_deep_png() && ImageFormat::from_path(&path).is_ok_and(|f| f == ImageFormat::Png));
+            let deep = contents.deep.as_ref().filter(|_| {
+                self.settings.has_deep_png() && ImageFormat::from_path(&path).is_ok_and(|f| f == ImageFormat::Png)
+            });
             match deep {
                 Some(image) => {
                     let image = if self.settings.background.is_some() { &picture::unassociated(image) } else { image };

@@ -51,8 +51,9 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     let range = timeline.range();
 
     // files are checked before anything is loaded
-    let files_of =
-        |number: u32| args.output.iter().map(|p| output::frames::numbered(p, u64::from(number))).collect::<Result<Vec<_>>>();
+    let files_of = |number: u32| {
+        args.output.iter().map(|p| output::frames::numbered(p, u64::from(number))).collect::<Result<Vec<_>>>()
+    };
     files_of(range.first)?.iter().try_for_each(|path| files::check_writable(path))?;
 
     interrupt::install();

@@ -257,7 +257,8 @@ mod tests {
         let mut viewer = TevViewer::connect(&address, Path::new("a.exr")).unwrap();
         viewer.patience = Duration::from_secs(1);
         let channel = |name: &str| Channel { name: name.into(), samples: Samples::F32(vec![0.5; 4 << 20]) };
-        let image = Image { width: 2048, height: 2048, channels: ["R", "G", "B"].map(channel).to_vec(), metadata: Vec::new() };
+        let image =
+            Image { width: 2048, height: 2048, channels: ["R", "G", "B"].map(channel).to_vec(), metadata: Vec::new() };
         let start = Instant::now();
         let error = viewer.send(&image).unwrap_err();
         assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());

@@ -117,7 +117,8 @@ impl AoVersusPathSettings {
         lit.integrators.ao.ao_radius = Some(Length::Units(best.radius.map_or(f64::INFINITY, rounded)));
         lit.integrators.ao.ao_falloff = report::significant_falloff(best.falloff).parse().ok().filter(|f| *f > 1.0);
         lit.integrators.ao.ao_normal = self.ao_normal;
-        lit.integrators.path.ambient = <[f64; 3]>::try_from(&best.ambient[..]).ok().map(|c| DVec3::from(c.map(rounded)));
+        lit.integrators.path.ambient =
+            <[f64; 3]>::try_from(&best.ambient[..]).ok().map(|c| DVec3::from(c.map(rounded)));
         lit.integrators.path.environment_light = fit.environment_light.filter(|e| *e == EnvironmentLight::Ambient);
 
         let mut path = RenderSettings { integrator: Some("path".parse()?), ..shared };
@@ -178,7 +179,11 @@ const COMMAND_SPP: u32 = 1024;
 ///
 /// # Errors
 /// Errors of [`Renderer::still`]; [`Error::Scene`] without surfaces in view or ambient light.
-pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &mut dyn Control) -> Result<AoVersusPath> {
+pub fn run(
+    renderer: &mut Renderer,
+    settings: &AoVersusPathSettings,
+    control: &mut dyn Control,
+) -> Result<AoVersusPath> {
     let start = Instant::now();
     let (settings, completed) = &settings.completed(renderer)?;
     let references = References::render(renderer, settings, control)?;
@@ -232,7 +237,8 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
     });
 
     // Puts together images and figures.
-    let direct = references.lights.as_ref().filter(|_| light == EnvironmentLight::Ambient).unwrap_or(&references.direct);
+    let direct =
+        references.lights.as_ref().filter(|_| light == EnvironmentLight::Ambient).unwrap_or(&references.direct);
     let image = picture(settings.size, &references, &path, direct, choice.attenuation, choice.ambient);
     let shares = LightShares::new(&references, &diffuse);
     let mut counted = vec![0.0; references.samples.pixels()];

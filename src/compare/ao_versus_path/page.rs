@@ -32,7 +32,9 @@ pub fn page(found: &AoVersusPath, command: &str, warnings: &[String]) -> Result<
 /// The target of a fit, in words.
 pub fn title(fit: &FitRecord) -> &'static str {
     match fit.environment_light {
-        Some(EnvironmentLight::Ambient) => "Against path tracing, ambient light in place of the environment and of bounces",
+        Some(EnvironmentLight::Ambient) => {
+            "Against path tracing, ambient light in place of the environment and of bounces"
+        }
         Some(EnvironmentLight::Traced) => "Against path tracing, ambient light in place of bounces",
         None => "Ambient visibility against ao-sky",
     }
@@ -47,7 +49,11 @@ pub fn scene_name(scene: &str) -> Cow<'_, str> {
 fn layer(image: &Image, prefix: &str, counted: &[f32]) -> Image {
     let of = |name: &str| {
         let full = format!("{prefix}{name}");
-        image.channels.iter().find(|c| c.name == full).map(|c| Channel { name: name.to_owned(), samples: c.samples.clone() })
+        image
+            .channels
+            .iter()
+            .find(|c| c.name == full)
+            .map(|c| Channel { name: name.to_owned(), samples: c.samples.clone() })
     };
     let alpha = Channel { name: "A".into(), samples: Samples::F32(counted.to_vec()) };
     Image { channels: ["R", "G", "B"].into_iter().filter_map(of).chain([alpha]).collect(), ..image.clone() }
@@ -63,7 +69,12 @@ fn images(found: &AoVersusPath) -> Result<Section> {
     let entries = vec![entry("lit, best fit", ""), entry("direct light", "direct."), entry("path tracing", "path.")];
     let set = ImageSet::new(entries, 2, &CompareOptions::default())?;
     let images: Vec<NamedImage> = (set.entries.iter().zip(&set.comparisons))
-        .map(|(e, c)| NamedImage { name: &e.name, description: &e.description, image: &e.image, comparison: c.as_ref() })
+        .map(|(e, c)| NamedImage {
+            name: &e.name,
+            description: &e.description,
+            image: &e.image,
+            comparison: c.as_ref(),
+        })
         .collect();
     let mut section = comparison::section("Images", &images, 2)?;
     section.parts.push(Part::Text("Metrics count the pixels that show nothing but surfaces that reflect ambient light: visible lamps would outweigh all else.".into()));

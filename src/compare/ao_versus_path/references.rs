@@ -43,9 +43,15 @@ impl References {
     pub fn render(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &mut dyn Control) -> Result<Self> {
         let [width, height] = settings.size;
         let samples = Samples::new(width as usize * height as usize, settings.ao_samples_per_half())?;
-        let mut references =
-            Self { indirect: Halves::default(), direct: Halves::default(), lights: None, sky: Halves::default(), samples };
-        let black = matches!(renderer.scene().environment, Environment::Black) && settings.lighting.environment.is_none();
+        let mut references = Self {
+            indirect: Halves::default(),
+            direct: Halves::default(),
+            lights: None,
+            sky: Halves::default(),
+            samples,
+        };
+        let black =
+            matches!(renderer.scene().environment, Environment::Black) && settings.lighting.environment.is_none();
         let mut renders = vec![Reference::Indirect, Reference::Direct];
         if !black {
             renders.push(Reference::Lights);
@@ -77,7 +83,8 @@ impl References {
         let wanted = render.settings(settings, half)?;
         if render == Reference::Samples {
             let samples = &mut self.samples;
-            return renderer.ambient_samples(&wanted, control, &mut |pixel, of_pixel| samples.add(half, pixel, of_pixel));
+            return renderer
+                .ambient_samples(&wanted, control, &mut |pixel, of_pixel| samples.add(half, pixel, of_pixel));
         }
         let image = renderer.still(&wanted, control)?.image;
         match render {

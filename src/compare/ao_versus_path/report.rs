@@ -265,7 +265,11 @@ impl<'a> Rows<'a> {
     fn fitted(&mut self, name: &'static str, signal: &Halves) -> [f64; 3] {
         let sums = self.target.sums(signal);
         let ambient = sums.ambient();
-        self.push(name, ambient[..self.target.channels].to_vec(), (self.energy - sums.explained()) / self.target.values());
+        self.push(
+            name,
+            ambient[..self.target.channels].to_vec(),
+            (self.energy - sums.explained()) / self.target.values(),
+        );
         ambient
     }
 
@@ -291,7 +295,8 @@ pub(super) fn fit_record(fit: &PathFit, light: EnvironmentLight) -> FitRecord {
     rows.choice("AO with the best radius", &found.binary);
     rows.choice("AO with the best falloff", &found.falloff);
     rows.choice("AO with the best radius and falloff", &found.both);
-    let sky = [0, 1].map(|h| reflectance[h].iter().enumerate().map(|(k, r)| r * fit.references.sky[h][k / 3]).collect());
+    let sky =
+        [0, 1].map(|h| reflectance[h].iter().enumerate().map(|(k, r)| r * fit.references.sky[h][k / 3]).collect());
     let color = rows.fitted("ao-sky in place of AO", &sky);
     // error = (sky - target) + (ao - sky)
     let sky = scaled(&sky, color, 3);
@@ -317,7 +322,11 @@ pub(super) fn sky_record(samples: &Samples, target: &Target, found: &Found) -> F
     rows.fitted("the same everywhere", &ones);
     let unlimited = samples.visibility(UNLIMITED);
     let difference = combine(&unlimited, &target.halves, |a, b| a - b);
-    rows.push("AO without radius or falloff, as it is", vec![1.0], target.product(&difference, &difference) / target.values());
+    rows.push(
+        "AO without radius or falloff, as it is",
+        vec![1.0],
+        target.product(&difference, &difference) / target.values(),
+    );
     rows.fitted("AO without radius or falloff", &unlimited);
     rows.choice("AO with the best radius", &found.binary);
     rows.choice("AO with the best falloff", &found.falloff);
@@ -359,8 +368,8 @@ fn metrics(image: &[f32], reference: &[f32], target: &Target, pixels: &[usize]) 
     let Ok(pair) = ImagePair::new(image, reference, target.channels, Some(&coverage)) else { return nan };
     let clamped = |image: &[f32]| image.iter().map(|v| v.clamp(0.0, 1.0)).collect::<Vec<_>>();
     let (a, b) = (clamped(image), clamped(reference));
-    let shown =
-        ImagePair::new(&a, &b, target.channels, Some(&coverage)).and_then(|p| flip(&p, target.width, PIXELS_PER_DEGREE));
+    let shown = ImagePair::new(&a, &b, target.channels, Some(&coverage))
+        .and_then(|p| flip(&p, target.width, PIXELS_PER_DEGREE));
     Metrics {
         flip: shown.map_or(f64::NAN, |f| f.mean),
         tanimoto: pair.tanimoto(),

@@ -78,7 +78,9 @@ impl Samples {
     fn image(&self, channels: usize, of: impl Fn(&[AmbientSample], &mut [f32]) + Sync) -> [Vec<f32>; 2] {
         [0, 1].map(|half| {
             let mut out = vec![0.0; channels * self.pixels()];
-            out.par_chunks_exact_mut(channels).enumerate().for_each(|(pixel, out)| of(self.pixel_samples(half, pixel), out));
+            out.par_chunks_exact_mut(channels)
+                .enumerate()
+                .for_each(|(pixel, out)| of(self.pixel_samples(half, pixel), out));
             out
         })
     }

@@ -112,7 +112,8 @@ impl Searcher<'_> {
 
     fn falloff(&self, coarse: &Table) -> Choice {
         let unlimited = coarse.radii.len() - 1;
-        let explained: Vec<f64> = (1..coarse.falloffs.len()).map(|f| coarse.sums(f, unlimited, None).explained()).collect();
+        let explained: Vec<f64> =
+            (1..coarse.falloffs.len()).map(|f| coarse.sums(f, unlimited, None).explained()).collect();
         let best = greatest(&explained);
         let half = 1.0 / coarse.falloffs[1 + best];
         let halves = around(half, 1.0, FINE_FALLOFFS);
@@ -120,7 +121,8 @@ impl Searcher<'_> {
         let fine = Table::evaluate(self.samples, self.thinned, &falloffs, &[f64::INFINITY]);
         let at = |without| peak(&(0..falloffs.len()).map(|f| fine.sums(f, 0, without).explained()).collect::<Vec<_>>());
         let (position, log_error) = jackknife(at, FINE_FALLOFFS);
-        let is_inside = (best > 0 || position > 0.0) && (best + 1 < explained.len() || position < (halves.len() - 1) as f64);
+        let is_inside =
+            (best > 0 || position > 0.0) && (best + 1 < explained.len() || position < (halves.len() - 1) as f64);
         let log_error = is_inside.then_some(log_error);
         self.exact((1.0 / interpolated(&halves, position)).min(MAX_LOG2), f64::INFINITY, log_error)
     }
@@ -223,7 +225,9 @@ mod tests {
         assert_eq!((peak(&[3.0, 2.0, 1.0]), peak(&[1.0, 2.0, 3.0]), peak(&[1.0])), (0.0, 2.0, 0.0));
         let list = geometric(1.0, 16.0, 2.0);
         assert!(
-            list.len() == 9 && (list[8] - 16.0).abs() < 1e-12 && (interpolated(&list, 4.5) - 2f64.powf(2.25)).abs() < 1e-12
+            list.len() == 9
+                && (list[8] - 16.0).abs() < 1e-12
+                && (interpolated(&list, 4.5) - 2f64.powf(2.25)).abs() < 1e-12
         );
     }
 

@@ -294,7 +294,11 @@ mod tests {
             for pixel in 0..pixels {
                 for _ in 0..per_half {
                     let distance = if random() < 0.3 { f32::INFINITY } else { random() * 10.0 };
-                    samples.add(half, pixel, &[AmbientSample { reflectance: [random(), random(), random()], distance }]);
+                    samples.add(
+                        half,
+                        pixel,
+                        &[AmbientSample { reflectance: [random(), random(), random()], distance }],
+                    );
                 }
             }
         }

@@ -52,7 +52,12 @@ pub struct AoOptions {
 
 impl Default for AoOptions {
     fn default() -> Self {
-        Self { samples: SampleSettings::default(), radius: f64::INFINITY, falloff: 1.0, hemisphere: Hemisphere::Geometric }
+        Self {
+            samples: SampleSettings::default(),
+            radius: f64::INFINITY,
+            falloff: 1.0,
+            hemisphere: Hemisphere::Geometric,
+        }
     }
 }
 
@@ -141,8 +146,16 @@ impl Integrator for AmbientOcclusion {
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
         let AoOptions { samples, radius, falloff, hemisphere } = Self::options(job);
-        let SampleSettings { size: _, spp: _, seed: _, pixel_filter, time_limit: _, keep_rays: _, tile_mask: _, film: _ } =
-            samples;
+        let SampleSettings {
+            size: _,
+            spp: _,
+            seed: _,
+            pixel_filter,
+            time_limit: _,
+            keep_rays: _,
+            tile_mask: _,
+            film: _,
+        } = samples;
         vec![
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
@@ -151,7 +164,13 @@ impl Integrator for AmbientOcclusion {
         ]
     }
 
-    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered> {
+    fn render(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        job: &RenderJob,
+        control: &mut dyn Control,
+    ) -> Result<Rendered> {
         let options = Self::options(job);
         let result = render(tracer, &job.camera_record(flat), &options, control)?;
         let report = report::report(&options, &result);
@@ -199,7 +218,12 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 ///
 /// # Errors
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
-pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
+pub fn render(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    options: &AoOptions,
+    control: &mut dyn Control,
+) -> Result<AoResult> {
     let device = tracer.device();
     let samples = &options.samples;
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);

@@ -33,8 +33,11 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
 
     // Explanations of skipped work.
     let is_binary = options.attenuation().is_binary();
-    let occlusion =
-        if is_binary { "binary occlusion: any-hit rays" } else { "occlusion falls off with distance: closest-hit rays" };
+    let occlusion = if is_binary {
+        "binary occlusion: any-hit rays"
+    } else {
+        "occlusion falls off with distance: closest-hit rays"
+    };
     let mut explanations = vec![occlusion.to_owned()];
     explanations.push(match options.attenuation().reach() {
         r if r.is_finite() => {

@@ -84,9 +84,14 @@ impl PathBuffers {
         stores_sky_pdfs: bool,
         params: PathParams,
     ) -> Result<(Self, PathParams)> {
-        let [has_signal, has_media, has_clear_walls, splits, has_ambient] =
-            [PathFeature::Signal, PathFeature::Media, PathFeature::ClearWalls, PathFeature::LightSplit, PathFeature::Ambient]
-                .map(|feature| features.contains(feature));
+        let [has_signal, has_media, has_clear_walls, splits, has_ambient] = [
+            PathFeature::Signal,
+            PathFeature::Media,
+            PathFeature::ClearWalls,
+            PathFeature::LightSplit,
+            PathFeature::Ambient,
+        ]
+        .map(|feature| features.contains(feature));
         let mut memory = PathMemory { device, most, buffers: Vec::new() };
 
         // queues, and what their rays may add to paths
@@ -100,7 +105,8 @@ impl PathBuffers {
         let ambient_contributions = memory.add_if(has_ambient, "contributions of ambient light", QUAD_BYTES)?;
 
         // the diffuse part of contributions, and of paths
-        let mut add_diffuse = |is_needed| memory.add_if(has_signal && is_needed, "diffuse part of contributions", QUAD_BYTES);
+        let mut add_diffuse =
+            |is_needed| memory.add_if(has_signal && is_needed, "diffuse part of contributions", QUAD_BYTES);
         let diffuse_contributions = add_diffuse(true)?;
         let later_diffuse_contributions = add_diffuse(has_clear_walls)?;
         let ambient_diffuse_contributions = add_diffuse(has_ambient)?;

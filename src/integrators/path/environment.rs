@@ -56,7 +56,12 @@ impl DeviceEnvironment {
             to_map: rows(&map.to_map),
             ..Default::default()
         };
-        Ok(Self { map: record, factor: map.factor, mean: totals.mean_radiance * map.factor, _buffers: vec![texels, table] })
+        Ok(Self {
+            map: record,
+            factor: map.factor,
+            mean: totals.mean_radiance * map.factor,
+            _buffers: vec![texels, table],
+        })
     }
 }
 

@@ -31,7 +31,10 @@ pub(super) fn features(
         (PathFeature::Media, !plain && media::need_tracking(flat)),
         (PathFeature::ClearWalls, clear_walls),
     ];
-    let all =
-        features.into_iter().chain(options.features()).filter_map(|(feature, required)| required.then_some(feature)).collect();
+    let all = features
+        .into_iter()
+        .chain(options.features())
+        .filter_map(|(feature, required)| required.then_some(feature))
+        .collect();
     (all, if samples_lights { lights.kinds() } else { LightKinds::default() })
 }

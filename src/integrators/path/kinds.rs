@@ -76,7 +76,16 @@ pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
-    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping, Denoising, RealTimeFrames],
+    capabilities: &[
+        LightTransport,
+        PathLength,
+        SceneLights,
+        Textures,
+        CameraModel,
+        ToneMapping,
+        Denoising,
+        RealTimeFrames,
+    ],
 };
 /// The ground truth that ambient occlusion approximates.
 pub static AO_SKY: PathVariant = PathVariant {
@@ -247,7 +256,13 @@ impl Integrator for PathVariant {
         identity
     }
 
-    fn render(&self, tracer: &Tracer, flat: &FlatScene, job: &RenderJob, control: &mut dyn Control) -> Result<Rendered> {
+    fn render(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        job: &RenderJob,
+        control: &mut dyn Control,
+    ) -> Result<Rendered> {
         let options = self.options(job)?;
         let result = render(tracer, flat, &job.camera_record(flat), &options, control)?;
         let report = report::report(tracer, flat, job, &options, &result);
@@ -269,7 +284,8 @@ impl Integrator for PathVariant {
         match self.view() {
             Some(View::Normals) => shown(&|n| 0.5 * n + 0.5),
             Some(View::Depth) => {
-                let greatest = image.f32("R").map_or(0.0, |d| d.iter().copied().fold(0.0, f32::max)).max(f32::MIN_POSITIVE);
+                let greatest =
+                    image.f32("R").map_or(0.0, |d| d.iter().copied().fold(0.0, f32::max)).max(f32::MIN_POSITIVE);
                 shown(&|d| d / greatest)
             }
             Some(View::BakedOcclusion) => shown(&|o| o),

@@ -62,8 +62,8 @@ impl Bounds {
     /// Split cost of Conty Estevez and Kulla: area, orientation and power.
     fn cost(&self) -> f64 {
         let (o, w) = (self.spread, (self.spread + self.falloff).min(PI));
-        let solid =
-            2.0 * PI * (1.0 - o.cos()) + 0.5 * PI * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
+        let solid = 2.0 * PI * (1.0 - o.cos())
+            + 0.5 * PI * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
         let d = self.hi - self.lo;
         self.intensity * solid.max(1e-9) * (d.x * d.y + d.y * d.z + d.z * d.x).max(1e-30)
     }
@@ -71,7 +71,8 @@ impl Bounds {
     fn node(&self, link: u32) -> LightNode {
         let centroid = self.centroid().as_vec3();
         // conservative: rounding of centre and radius must not leave a light outside
-        let radius = (self.hi - centroid.as_dvec3()).length().max((self.lo - centroid.as_dvec3()).length()) * (1.0 + 1e-6);
+        let radius =
+            (self.hi - centroid.as_dvec3()).length().max((self.lo - centroid.as_dvec3()).length()) * (1.0 + 1e-6);
         // a little wider than the cone is: single precision
         let spread = (self.spread + 1e-4).min(PI);
         LightNode {
@@ -225,15 +226,24 @@ mod tests {
                 let axis = (DVec3::new(random(i, 3), random(i, 4), random(i, 5)) - 0.5).normalize();
                 let size = DVec3::splat(0.05 * random(i, 6));
                 let (spread, falloff) = if i % 5 == 0 { (PI, 0.5 * PI) } else { (0.0, 0.5 * PI) };
-                Bounds { lo: at - size, hi: at + size, axis, spread, falloff, two_sided: i % 3 == 0, intensity: random(i, 7) }
+                Bounds {
+                    lo: at - size,
+                    hi: at + size,
+                    axis,
+                    spread,
+                    falloff,
+                    two_sided: i % 3 == 0,
+                    intensity: random(i, 7),
+                }
             })
             .collect()
     }
 
     /// shaders/path/light_tree.glsl, in double precision.
     fn importance(n: &LightNode, from: DVec3) -> f64 {
-        let less =
-            |a: (f64, f64), b: (f64, f64)| if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) };
+        let less = |a: (f64, f64), b: (f64, f64)| {
+            if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) }
+        };
         let d = from - glam::Vec3::from_array(n.center).as_dvec3();
         let (d2, r2) = (d.length_squared(), f64::from(n.radius).powi(2));
         if d2 <= r2 {
@@ -292,7 +302,10 @@ mod tests {
             let (a, b) = ((axis(0), PI * random(k, 9)), (axis(3), PI * random(k, 10)));
             let (axis, spread) = cone_union(a, b);
             for c in [a, b] {
-                assert!(spread >= PI - 1e-9 || axis.angle_between(c.0) + c.1 <= spread + 1e-6, "{a:?} {b:?}: {axis} {spread}");
+                assert!(
+                    spread >= PI - 1e-9 || axis.angle_between(c.0) + c.1 <= spread + 1e-6,
+                    "{a:?} {b:?}: {axis} {spread}"
+                );
             }
         }
     }

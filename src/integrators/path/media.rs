@@ -58,7 +58,9 @@ impl ClosedVolumes {
                     let [a, b, c] = corners.map(|k| mesh.positions[k as usize].as_dvec3());
                     [a, b - a, c - a]
                 })),
-                Geometry::Spheres(all) => spheres.extend(all.iter().map(|s| (s.center.as_dvec3(), f64::from(s.radius)))),
+                Geometry::Spheres(all) => {
+                    spheres.extend(all.iter().map(|s| (s.center.as_dvec3(), f64::from(s.radius))))
+                }
             }
             Some(VolumeMesh { material: mesh.material as u32, to_object: to_world.inverse(), triangles, spheres })
         };
@@ -70,7 +72,10 @@ impl ClosedVolumes {
     pub fn containing(&self, point: DVec3) -> [u32; MAX_NESTED] {
         let by_direction = DIRECTIONS.map(|d| self.along(point, d));
         // the majority; if all three differ, the first
-        let most = by_direction.iter().find(|a| by_direction.iter().filter(|b| b == a).count() > 1).unwrap_or(&by_direction[0]);
+        let most = by_direction
+            .iter()
+            .find(|a| by_direction.iter().filter(|b| b == a).count() > 1)
+            .unwrap_or(&by_direction[0]);
         let mut stack = [INVALID; MAX_NESTED];
         stack.iter_mut().zip(most).for_each(|(slot, &material)| *slot = material);
         stack

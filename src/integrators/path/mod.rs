@@ -98,7 +98,13 @@ pub fn render(
     options: &PathOptions,
     control: &mut dyn Control,
 ) -> Result<PathResult> {
-    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.samples.spp, options.samples.seed, control)
+    PathIntegrator::new(tracer, flat, options)?.render(
+        tracer,
+        camera,
+        options.samples.spp,
+        options.samples.seed,
+        control,
+    )
 }
 
 /// Renders one scene repeatedly: lights, environment, queues and pipelines are created once.
@@ -114,7 +120,8 @@ impl PathIntegrator {
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        let capacity = max_rays(launch_rays(&tracer.device().info), options.samples.size, options.samples.spp, MAX_SAMPLE_BITS);
+        let capacity =
+            max_rays(launch_rays(&tracer.device().info), options.samples.size, options.samples.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
@@ -310,8 +317,11 @@ impl PathEstimator {
         let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
 
         // Buffers.
-        let base =
-            PathParams { map: environment.map, environment: environment.factor.to_array(), ..lights.params(options.params()) };
+        let base = PathParams {
+            map: environment.map,
+            environment: environment.factor.to_array(),
+            ..lights.params(options.params())
+        };
         let (mut buffers, base) = PathBuffers::new(device, most, features, stores_sky_pdfs, base)?;
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
         let transmits = samples_lights && features.contains(PathFeature::ClearWalls);
@@ -482,7 +492,12 @@ impl PathEstimator {
 
     /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with
     /// thin walls that transmit, one. Then records `finish`, which reads the paths.
-    fn trace(&mut self, commands: &mut Commands, push: Push, finish: impl Fn(&Self, &mut Recorder)) -> Result<Vec<Timing>> {
+    fn trace(
+        &mut self,
+        commands: &mut Commands,
+        push: Push,
+        finish: impl Fn(&Self, &mut Recorder),
+    ) -> Result<Vec<Timing>> {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // a surface that a path passes straight through is no bounce, but needs a launch
@@ -550,7 +565,8 @@ impl PathEstimator {
                 }
                 self.traced.bounce_rays += u64::from(rays);
             }
-            let sum = |first: usize| counts.iter().skip(first).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
+            let sum =
+                |first: usize| counts.iter().skip(first).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
             self.traced.shadow_rays += sum(1) + sum(DISTANT_COUNT as usize);
             self.traced.ambient_rays += sum(AMBIENT_COUNT as usize);
             left = counts[(COUNTS * MAX_BOUNCES) as usize];

@@ -99,7 +99,10 @@ fn chosen_by(result: &PathResult) -> String {
     let ways = [
         (result.light_tree, "a light tree"),
         (has(PathFeature::LightChoice), "the irradiance of distant ones"),
-        (has(PathFeature::LightGroups) && !has(PathFeature::LightSplit), "the irradiance of placed and of distant ones"),
+        (
+            has(PathFeature::LightGroups) && !has(PathFeature::LightSplit),
+            "the irradiance of placed and of distant ones",
+        ),
         (has(PathFeature::LightSplit), "one placed and one distant light at first vertices, by irradiance at others"),
     ];
     let ways: Vec<_> = ways.into_iter().filter_map(|(is_used, way)| is_used.then_some(way)).collect();
@@ -127,7 +130,9 @@ fn mip_levels(o: &PathOptions, stats: &BuildStats) -> String {
     match o.texture_filter {
         TextureFilter::Bilinear => "mip levels: unused (--texture-filter ray-cone uses them)".into(),
         TextureFilter::RayCone if stats.mip_levels == 0 => "mip levels: none, no surface has a texture".into(),
-        TextureFilter::RayCone => format!("mip levels: up to {}, {} bytes beside the first", stats.mip_levels, stats.mip_bytes),
+        TextureFilter::RayCone => {
+            format!("mip levels: up to {}, {} bytes beside the first", stats.mip_levels, stats.mip_bytes)
+        }
     }
 }
 

@@ -205,7 +205,16 @@ impl PathOptions {
         // Without `..`, so that a new option must be added here.
         let Self {
             samples:
-                SampleSettings { size: _, spp: _, seed: _, pixel_filter, time_limit: _, keep_rays: _, tile_mask: _, film: _ },
+                SampleSettings {
+                    size: _,
+                    spp: _,
+                    seed: _,
+                    pixel_filter,
+                    time_limit: _,
+                    keep_rays: _,
+                    tile_mask: _,
+                    film: _,
+                },
             max_depth,
             min_depth,
             rr_depth,
@@ -431,7 +440,8 @@ mod tests {
             let mut options = PathOptions::default();
             options.set_numbers(&settings);
             assert_ne!(options.numbers(), PathOptions::default().numbers(), "shaders do not get {name}");
-            let value = |options: &PathOptions| options.described().into_iter().find(|d| d.0 == name).map(|d| (d.1, d.2));
+            let value =
+                |options: &PathOptions| options.described().into_iter().find(|d| d.0 == name).map(|d| (d.1, d.2));
             assert_ne!(value(&options), value(&PathOptions::default()), "{name} is not described");
             settings = PathSettings::default();
         }

@@ -44,7 +44,8 @@ impl Filters {
         const BY: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
         // the paper gives all of them the reach of the widest
         let reach = (3.0 * (BY[0].1 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i64;
-        let sensitivity = |(_, b): (f64, f64)| sampled(reach, |x| (-PI * PI * (x / pixels_per_degree).powi(2) / b).exp());
+        let sensitivity =
+            |(_, b): (f64, f64)| sampled(reach, |x| (-PI * PI * (x / pixels_per_degree).powi(2) / b).exp());
         let [first, second] = BY.map(|(a, b)| {
             let taps = sensitivity((a, b));
             // what the product of two such filters adds up to

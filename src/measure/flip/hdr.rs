@@ -78,7 +78,8 @@ fn exposure_range(pair: &ImagePair) -> Option<[f64; 2]> {
 
 /// The value that the tone mapping operator maps to `shown`.
 fn brought_to(shown: f64) -> f64 {
-    let [a, b, c] = [NUMERATOR[0] - shown * DENOMINATOR[0], NUMERATOR[1] - shown * DENOMINATOR[1], -shown * DENOMINATOR[2]];
+    let [a, b, c] =
+        [NUMERATOR[0] - shown * DENOMINATOR[0], NUMERATOR[1] - shown * DENOMINATOR[1], -shown * DENOMINATOR[2]];
     (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a)
 }
 

@@ -74,7 +74,8 @@ pub fn flip(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Result<Fl
     if !(1.0..=10_000.0).contains(&pixels_per_degree) {
         return wrong("pixels per degree must be between 1 and 10000 (67 is usual)");
     }
-    let eye = Eye { filters: Filters::new(pixels_per_degree), space: Space::new(), width, height: pixels / width, channels };
+    let eye =
+        Eye { filters: Filters::new(pixels_per_degree), space: Space::new(), width, height: pixels / width, channels };
     let greatest = eye.greatest_difference();
     let mut map = vec![0.0; pixels];
     map.par_chunks_mut(width * BAND).enumerate().for_each(|(band, errors)| {
@@ -84,7 +85,8 @@ pub fn flip(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Result<Fl
             let k = (rows.start * width + i) * channels;
             let finite = |values: &[f32]| values[k..k + channels].iter().all(|v| v.is_finite());
             let whole = finite(pair.image) && finite(pair.reference);
-            *error = if whole { combined(a.difference(&b, i), a.feature_difference(&b, i), greatest) } else { f32::NAN };
+            *error =
+                if whole { combined(a.difference(&b, i), a.feature_difference(&b, i), greatest) } else { f32::NAN };
         }
     });
     let mean = pair.mean_of(&map);

@@ -75,14 +75,18 @@ impl LongFrame {
 impl Pass for Antialias {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            Denoised, DiffuseHistory, FrameNumber, Guide, Normals, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface,
+            Denoised, DiffuseHistory, FrameNumber, Guide, Normals, PreviousPosition, Resolved, ResolvedHistory, Rest,
+            Surface,
         };
         let rest: &[Resource] = if self.has_rest { &[Rest, Denoised] } else { &[] };
         let light: &[Resource] = if self.input == Resource::Composed { &[DiffuseHistory] } else { &[] };
-        ResourceUse::new(&[FrameNumber, Guide, Surface, Normals, PreviousPosition, self.input], &[ResolvedHistory, Resolved])
-            .previous(&[Guide, ResolvedHistory])
-            .and_reads(rest)
-            .and_reads(light)
+        ResourceUse::new(
+            &[FrameNumber, Guide, Surface, Normals, PreviousPosition, self.input],
+            &[ResolvedHistory, Resolved],
+        )
+        .previous(&[Guide, ResolvedHistory])
+        .and_reads(rest)
+        .and_reads(light)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

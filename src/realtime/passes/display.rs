@@ -29,8 +29,9 @@ impl DisplayMode {
     /// [`Error::Usage`], naming those that they have.
     pub fn check_radiance(self) -> Result<()> {
         use DisplayMode::{Depth, Ids, Motion, Normal, Position};
-        let is_there =
-            |m: &DisplayMode| debug_view(*m).is_some() || [Self::Result, Depth, Normal, Position, Ids, Motion].contains(m);
+        let is_there = |m: &DisplayMode| {
+            debug_view(*m).is_some() || [Self::Result, Depth, Normal, Position, Ids, Motion].contains(m)
+        };
         if is_there(&self) {
             return Ok(());
         }
@@ -84,8 +85,8 @@ pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
 impl Pass for DisplayPass {
     fn uses(&self, display: Option<&Display>) -> ResourceUse {
         use Resource::{
-            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, Normals, PreviousPosition,
-            Resolved, Result, Surface,
+            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, Normals,
+            PreviousPosition, Resolved, Result, Surface,
         };
         let uses = ResourceUse::new(&[DisplaySettings], &[DisplayImage]);
         if self.shows_rays {

@@ -23,8 +23,11 @@ pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
 
 impl Pass for Gtao {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        ResourceUse::new(&[Resource::FrameNumber, Resource::Camera, Resource::Guide, Resource::Normals], &[Resource::Current])
-            .clears(Resource::Current, 0)
+        ResourceUse::new(
+            &[Resource::FrameNumber, Resource::Camera, Resource::Guide, Resource::Normals],
+            &[Resource::Current],
+        )
+        .clears(Resource::Current, 0)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

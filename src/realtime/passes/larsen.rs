@@ -68,14 +68,19 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
 
     // the stages
     let pass = |work| -> Result<Box<dyn Pass>> {
-        Ok(Box::new(Larsen { work, shared: shared.clone(), params: Params::new(device, "parameters of Larsen's pipeline")? }))
+        Ok(Box::new(Larsen {
+            work,
+            shared: shared.clone(),
+            params: Params::new(device, "parameters of Larsen's pipeline")?,
+        }))
     };
     let tiles = |size: [u32; 2]| Block { origin: [0, 0], size }.rays();
     let light_rays = tiles(size) * lights.len() as u32;
     let pixels = Range::all(size[0] * size[1]);
     let mut stages = vec![Stage::new(vec![pass(Work::Keep)?], pixels.clone())];
     // without lights the pass runs, too, and clears the number of visible lights
-    let light_ranges = if light_rays > 0 { Range::launches(light_rays, 1, settings.launch_rays) } else { Range::all(0) };
+    let light_ranges =
+        if light_rays > 0 { Range::launches(light_rays, 1, settings.launch_rays) } else { Range::all(0) };
     stages.push(Stage::new(vec![pass(Work::Light(tracer.stream(&shaders::LARSEN_LIGHT_ANY)?))?], light_ranges));
     stages.push(Stage::new(
         vec![
@@ -92,16 +97,17 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
 impl Pass for Larsen {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            Combined, FrameNumber, Guide, Normals, Occlusion, PreviousResult, RayCount, Result, Samples, Surface, VisibleLights,
+            Combined, FrameNumber, Guide, Normals, Occlusion, PreviousResult, RayCount, Result, Samples, Surface,
+            VisibleLights,
         };
         let surfaces = [FrameNumber, Guide, Surface, Normals];
         match self.work {
             Work::Keep => ResourceUse::new(&[Result], &[PreviousResult]),
             Work::Light(_) => ResourceUse::new(&surfaces, &[VisibleLights]).clears(VisibleLights, 0),
             Work::Occlusion(_) => ResourceUse::new(&surfaces, &[Samples]).and_reads(&[VisibleLights]),
-            Work::Sum(_) => {
-                ResourceUse::new(&surfaces, &[Occlusion, RayCount]).and_reads(&[VisibleLights, Samples]).clears(RayCount, 0)
-            }
+            Work::Sum(_) => ResourceUse::new(&surfaces, &[Occlusion, RayCount])
+                .and_reads(&[VisibleLights, Samples])
+                .clears(RayCount, 0),
             Work::Blur(_) => ResourceUse::new(&surfaces, &[Combined]).and_reads(&[Occlusion]),
             Work::Temporal(_) => ResourceUse::new(&surfaces, &[Result]).and_reads(&[Combined, PreviousResult]),
         }
@@ -126,7 +132,8 @@ impl Pass for Larsen {
     fn record(&self, r: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()> {
         match &self.work {
             Work::Keep => {
-                if let (Some(from), Some(to)) = (resources.buffer(Resource::Result), resources.buffer(Resource::PreviousResult))
+                if let (Some(from), Some(to)) =
+                    (resources.buffer(Resource::Result), resources.buffer(Resource::PreviousResult))
                 {
                     r.copy(from, 0, to, 0, to.size());
                 }

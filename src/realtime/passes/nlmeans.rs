@@ -50,10 +50,14 @@ struct NlMeans {
 /// The two passes, over all pixels and over all blocks of pixels.
 pub fn stages(tracer: &Tracer, size: [u32; 2]) -> Result<[Stage; 2]> {
     let device = tracer.device();
-    let noise =
-        Noise { pipeline: shaders::REST_NOISE.pipeline(device)?, params: Params::new(device, "parameters of noise at rest")? };
-    let nlmeans =
-        NlMeans { pipeline: shader(CHANNELS).pipeline(device)?, params: Params::new(device, "parameters of non-local means")? };
+    let noise = Noise {
+        pipeline: shaders::REST_NOISE.pipeline(device)?,
+        params: Params::new(device, "parameters of noise at rest")?,
+    };
+    let nlmeans = NlMeans {
+        pipeline: shader(CHANNELS).pipeline(device)?,
+        params: Params::new(device, "parameters of non-local means")?,
+    };
     Ok([
         Stage::new(vec![Box::new(noise)], Range::all(size[0] * size[1])),
         Stage::new(vec![Box::new(nlmeans)], Range::all(blocks(size, CHANNELS))),

@@ -44,7 +44,8 @@ pub fn stage(
     has_rest: bool,
 ) -> Result<Stage> {
     // a range is a launch, or several of the same pixels, and has room for uncovered ones
-    let pixels = settings.launch_rays.min(paths.capacity()) / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
+    let pixels =
+        settings.launch_rays.min(paths.capacity()) / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
     let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
     let gather = || Params::new(tracer.device(), "parameters of gathering");
     let uncovered = uncovered.map(|list| Ok::<_, Error>((list, gather()?))).transpose()?;
@@ -162,7 +163,14 @@ impl Pass for Paths {
                 // samples at rest are as many for all pixels
                 let (rest, rest_parts, earlier) = (0, 0, frame.plan.progress.samples);
                 let first_path = push.count;
-                gather.write(&GatherParams { listed: list.address(), first_path, earlier, rest, rest_parts, ..gathered })?;
+                gather.write(&GatherParams {
+                    listed: list.address(),
+                    first_path,
+                    earlier,
+                    rest,
+                    rest_parts,
+                    ..gathered
+                })?;
                 let sample_bits = sample_bits + bits;
                 let count = uncovered.uncovered << sample_bits;
                 gathers.push(Push { pass: gather.address(), first: 0, count, sample_bits, ..push });

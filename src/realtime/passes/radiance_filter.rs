@@ -28,7 +28,12 @@ struct RadianceFilter {
 
 /// The steps of the filter over the tiles of the image, and the images that hold the results:
 /// diffuse reflection and the rest, which is black without `has_specular` and left alone.
-pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
+pub fn stages(
+    tracer: &Tracer,
+    block: Block,
+    settings: &Settings,
+    has_specular: bool,
+) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::DENOISE.specialized(device, &settings.filter.specialization())?);
     let steps = settings.filter.steps();

@@ -17,8 +17,10 @@ struct Rest {
 /// The pass over all pixels.
 pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
     let device = tracer.device();
-    let pass =
-        Rest { pipeline: shaders::REST.pipeline(device)?, params: Params::new(device, "parameters of samples at rest")? };
+    let pass = Rest {
+        pipeline: shaders::REST.pipeline(device)?,
+        params: Params::new(device, "parameters of samples at rest")?,
+    };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 

@@ -38,9 +38,12 @@ impl Pass for Temporal {
         use Resource::{
             BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Normals, PreviousPosition, Scene, Surface,
         };
-        ResourceUse::new(&[FrameNumber, Scene, Guide, Surface, Normals, PreviousPosition, Current, CurrentBent], &[History])
-            .previous(&[Guide, History, BentHistory])
-            .and_writes(self.has_bent, &[BentHistory])
+        ResourceUse::new(
+            &[FrameNumber, Scene, Guide, Surface, Normals, PreviousPosition, Current, CurrentBent],
+            &[History],
+        )
+        .previous(&[Guide, History, BentHistory])
+        .and_writes(self.has_bent, &[BentHistory])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

@@ -90,8 +90,9 @@ impl Counts {
     /// sample_bits` paths and there is `room` for more paths. `None`: there are none, or too many.
     pub fn listed_bits(self, sample_bits: u32, room: u32) -> Option<u32> {
         let all = |bits: u32| u64::from(self.uncovered) << bits;
-        let fits =
-            |bits: &u32| all(*bits) <= u64::from(self.surfaces / UNCOVERED_SHARE) && all(bits + sample_bits) <= u64::from(room);
+        let fits = |bits: &u32| {
+            all(*bits) <= u64::from(self.surfaces / UNCOVERED_SHARE) && all(bits + sample_bits) <= u64::from(room)
+        };
         (0..=MAX_BITS.saturating_sub(sample_bits)).rev().find(fits).filter(|_| self.uncovered > 0)
     }
 }

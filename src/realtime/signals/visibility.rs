@@ -7,7 +7,9 @@ use crate::raster::Primary;
 use crate::realtime::frame_samples::FrameSamples;
 use crate::realtime::graph::{Pass, Range, Stage};
 use crate::realtime::history::History;
-use crate::realtime::passes::{antialias, ao_trace, filter, gather, gbuffer, gtao, nlmeans, rest, rest_samples, temporal};
+use crate::realtime::passes::{
+    antialias, ao_trace, filter, gather, gbuffer, gtao, nlmeans, rest, rest_samples, temporal,
+};
 use crate::realtime::plan::{FramePlan, Inputs, RestProgress, SamplePlacement, Signal};
 use crate::realtime::resources::{Extent, Resource};
 use crate::realtime::settings::{Settings, Technique};

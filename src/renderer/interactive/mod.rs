@@ -25,7 +25,9 @@ use crate::shaders::StreamShaders;
 use crate::tracer::{BuildStats, ComputeOptions, DeviceSettings, MovedBounds, Needs, Tracer, TracerKind};
 
 pub use pick::Pick;
-pub use view::{View, ViewPicture, ViewStep, ViewValues, camera_placement, camera_settings, render_command, render_flags};
+pub use view::{
+    View, ViewPicture, ViewStep, ViewValues, camera_placement, camera_settings, render_command, render_flags,
+};
 
 /// A scene with its tracers, for views that change ([`Renderer::interactive`]).
 pub struct Interactive<'r> {

@@ -22,8 +22,8 @@ use crate::output::{self, Channel, FileSettings, Image, Picture, png};
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::renderer::frames::{
-    colour_channels, frame_display, frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion,
-    pipeline, settling_frames,
+    colour_channels, frame_display, frame_needs, frame_path_options, frame_settings, frame_streams,
+    is_ambient_occlusion, pipeline, settling_frames,
 };
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::shell::quoted;
@@ -172,7 +172,11 @@ impl View {
         Ok((traced.number, Kind::Frames(Box::new(view))))
     }
 
-    fn new_still(session: &mut Interactive, settings: &RenderSettings, control: &mut dyn Control) -> Result<(u32, Kind)> {
+    fn new_still(
+        session: &mut Interactive,
+        settings: &RenderSettings,
+        control: &mut dyn Control,
+    ) -> Result<(u32, Kind)> {
         let integrator = settings.integrator().get();
         let (needs, streams) = (integrator.needs(&settings.integrators), integrator.streams(&settings.integrators));
         let index = session.traced_scene(integrator.blend(), needs, streams, control)?;
@@ -444,7 +448,13 @@ impl StillView {
 }
 
 /// The command that renders what a view shows: `skylit render SCENE ...`, quoted for a shell.
-pub fn render_flags(name: &str, settings: &RenderSettings, cameras: &[Camera], camera: &Camera, size: [u32; 2]) -> String {
+pub fn render_flags(
+    name: &str,
+    settings: &RenderSettings,
+    cameras: &[Camera],
+    camera: &Camera,
+    size: [u32; 2],
+) -> String {
     let mut settings = settings.clone();
     settings.image.size = Some(size);
     settings.camera = camera_settings(cameras, camera);

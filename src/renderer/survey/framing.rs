@@ -108,7 +108,13 @@ pub struct ChosenCamera {
 impl ChosenCamera {
     /// A perspective camera with its position and direction to a ten-thousandth of the scene's
     /// diagonal: about a tenth of a pixel. It was made with `up`; `fov_y` (radians) was asked for.
-    fn rounded(camera: &Camera, up: DVec3, fov_y: Option<f64>, bounds: (DVec3, DVec3), words: impl Into<String>) -> Self {
+    fn rounded(
+        camera: &Camera,
+        up: DVec3,
+        fov_y: Option<f64>,
+        bounds: (DVec3, DVec3),
+        words: impl Into<String>,
+    ) -> Self {
         let (lo, hi) = bounds;
         let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
         let diagonal = (hi - lo).length();
@@ -369,8 +375,10 @@ fn outside(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Res
         preference * (fronts - backs) / (fronts + backs).max(1.0) * (0.5 + variety)
     };
     let preferences = OUTSIDE.iter().map(|o| o.1);
-    let scores =
-        trace_views(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
+    let scores = trace_views(&cameras, aspect, trace)?
+        .into_iter()
+        .zip(preferences)
+        .map(|(seen, preference)| score(seen, preference));
     choose_best(cameras, scores)
 }
 
@@ -425,7 +433,8 @@ mod tests {
     fn inside(rays: &[(DVec3, DVec3)], open: impl Fn(DVec3) -> bool) -> Result<Vec<Option<VisibleSurface>>> {
         let (lo, hi) = BOUNDS;
         let is_inside = |p: DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
-        let distance = |(from, d): &(DVec3, DVec3)| ((DVec3::select(d.cmpgt(DVec3::ZERO), hi, lo) - *from) / *d).min_element();
+        let distance =
+            |(from, d): &(DVec3, DVec3)| ((DVec3::select(d.cmpgt(DVec3::ZERO), hi, lo) - *from) / *d).min_element();
         Ok(rays.iter().map(|ray| if is_inside(ray.0) && !open(ray.1) { hit(distance(ray)) } else { None }).collect())
     }
 
@@ -449,8 +458,10 @@ mod tests {
         let rays = view_rays(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Y, 1.0), 1.0);
         let wall = vec![hit(2.0); rays.len()];
         // planes across the view, each at a distance of its own
-        let steps: Vec<_> =
-            (0..rays.len()).map(|k| hit(2.0 + k as f64)).map(|s| s.map(|s| VisibleSurface { normal: DVec3::X, ..s })).collect();
+        let steps: Vec<_> = (0..rays.len())
+            .map(|k| hit(2.0 + k as f64))
+            .map(|s| s.map(|s| VisibleSurface { normal: DVec3::X, ..s }))
+            .collect();
         let flat: Vec<_> = rays.iter().map(|(_, d)| hit(-1.6 / d.y)).collect();
         let of = |seen: &[Option<VisibleSurface>]| detail(&rays, seen, 100.0);
         assert_eq!(of(&flat), 1.0 / rays.len() as f64, "a floor is one plane");
@@ -460,9 +471,13 @@ mod tests {
 
     #[test]
     fn scenes_are_looked_at_by_the_host() {
-        for (name, inside) in
-            [("closed-box", true), ("stairs", false), ("cornell-box", false), ("terrain:2000", false), ("spheres:50", false)]
-        {
+        for (name, inside) in [
+            ("closed-box", true),
+            ("stairs", false),
+            ("cornell-box", false),
+            ("terrain:2000", false),
+            ("spheres:50", false),
+        ] {
             let mut scene = builtin::by_name(name).unwrap();
             if let (true, Geometry::Triangles(mesh)) = (inside, &mut scene.meshes[0].geometry) {
                 // walls that face the room
@@ -488,7 +503,9 @@ mod tests {
         mesh.normals.clear();
         mesh.texcoords.iter_mut().for_each(|t| t.clear());
         let (lo, hi) = scene.bounds().unwrap();
-        let eye = |scene: &Scene| choose_on_host(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
+        let eye = |scene: &Scene| {
+            choose_on_host(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation
+        };
         let is_inside = |p: DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
         assert!(!is_inside(eye(&scene)));
         // as two meshes it is a room with thick walls
@@ -562,7 +579,9 @@ mod tests {
         };
         let (lo, hi) = survey.bounds().unwrap();
         use ViewName::{Back, Front, Inside, Iso, Left, Right, Top};
-        assert!(eye(Front).z > hi.z && eye(Back).z < lo.z && eye(Left).x < lo.x && eye(Right).x > hi.x && eye(Top).y > hi.y);
+        assert!(
+            eye(Front).z > hi.z && eye(Back).z < lo.z && eye(Left).x < lo.x && eye(Right).x > hi.x && eye(Top).y > hi.y
+        );
         assert!(eye(Iso).cmpgt((lo + hi) * 0.5).all());
         let inside = eye(Inside);
         assert!(inside.cmpgt(lo).all() && inside.cmplt(hi).all());

@@ -65,10 +65,16 @@ pub fn visible_surfaces(scene: &Scene, rays: &[(DVec3, DVec3)], hits: Vec<Option
             }
         };
         // spheres have no back: what is inside sees them as a room
-        let is_front = outwards.dot(*direction) < 0.0 || matches!(scene.meshes[instance.mesh].geometry, Geometry::Spheres(_));
+        let is_front =
+            outwards.dot(*direction) < 0.0 || matches!(scene.meshes[instance.mesh].geometry, Geometry::Spheres(_));
         let normal = outwards.normalize_or(-*direction);
         let normal = if normal.dot(*direction) > 0.0 { -normal } else { normal };
-        Some(VisibleSurface { distance: f64::from(hit.t), is_front, normal, material: scene.meshes[instance.mesh].material })
+        Some(VisibleSurface {
+            distance: f64::from(hit.t),
+            is_front,
+            normal,
+            material: scene.meshes[instance.mesh].material,
+        })
     };
     hits.into_iter().zip(rays).map(of).collect()
 }
@@ -79,7 +85,8 @@ mod tests {
 
     #[test]
     fn rays_pass_through_corners_and_centre() {
-        let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 0.0), DVec3::Y, 90f64.to_radians());
+        let camera =
+            Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 0.0), DVec3::Y, 90f64.to_radians());
         let (origin, direction) = camera_ray(&camera, [0.5, 0.5], 2.0);
         assert!(origin == DVec3::new(1.0, 2.0, 3.0) && (direction - DVec3::NEG_Z).length() < 1e-12);
         let (_, corner) = camera_ray(&camera, [0.0, 0.0], 2.0);

@@ -29,11 +29,17 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
     for (i, deformation) in parts.deformations.iter().enumerate() {
         let mesh = deformation.mesh;
         match seen.get_mut(mesh) {
-            None => return Err(format!("deformation {i}: mesh {mesh} does not exist (the scene has {})", scene.meshes.len())),
+            None => {
+                return Err(format!(
+                    "deformation {i}: mesh {mesh} does not exist (the scene has {})",
+                    scene.meshes.len()
+                ));
+            }
             Some(true) => return Err(format!("mesh {mesh} deforms in two ways")),
             Some(seen) => *seen = true,
         }
-        check_deformation(deformation, scene, parts).map_err(|e| format!("mesh {mesh} `{}`: {e}", scene.meshes[mesh].name))?;
+        check_deformation(deformation, scene, parts)
+            .map_err(|e| format!("mesh {mesh} `{}`: {e}", scene.meshes[mesh].name))?;
     }
     for (i, animation) in parts.animations.iter().enumerate() {
         check_animation(animation, parts).map_err(|e| format!("animation {i} `{}`, {e}", animation.name))?;
@@ -80,7 +86,10 @@ fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &RigParts)
         None if deformation.influences.is_empty() => 0,
         None => return Err("has joints and weights, but no skin".to_owned()),
         Some(s) if !(1..=2).contains(&deformation.influences.len()) => {
-            return Err(format!("has skin {s} and {} sets of joints; one or two are read", deformation.influences.len()));
+            return Err(format!(
+                "has skin {s} and {} sets of joints; one or two are read",
+                deformation.influences.len()
+            ));
         }
         Some(s) => parts.skins.get(s).ok_or_else(|| format!("skin {s} does not exist"))?.joints.len(),
     };

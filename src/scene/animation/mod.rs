@@ -194,7 +194,8 @@ impl AnimationRig {
         if let Some(i) = rest.iter().position(|m| !m.is_finite()) {
             return Err(format!("node {i} `{}` has a transform that is not finite", parts.nodes[i].name));
         }
-        let still = parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_constant(&parts.nodes[c.node])).collect());
+        let still =
+            parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_constant(&parts.nodes[c.node])).collect());
         Ok(Self { still: still.collect(), rest, shapes: Vec::new(), floors: Vec::new(), parts })
     }
 
@@ -228,14 +229,17 @@ impl Channel {
     /// Whether it keeps the node at its rest value, up to rounding. Exporters write such channels
     /// for everything that could be animated.
     pub(in crate::scene) fn is_constant(&self, node: &Node) -> bool {
-        let close =
-            |a: f64, b: f32| (a - f64::from(b)).abs() <= 2.0 * f64::from(f32::EPSILON) * a.abs().max(f64::from(b.abs()));
+        let close = |a: f64, b: f32| {
+            (a - f64::from(b)).abs() <= 2.0 * f64::from(f32::EPSILON) * a.abs().max(f64::from(b.abs()))
+        };
         let same = |v: &[f32]| match (self.property, node.local) {
             (Property::Weights, _) => v == node.weights,
             (Property::Translation, LocalTransform::Trs { translation: at, .. }) => {
                 at.to_array().iter().zip(v).all(|(a, b)| close(*a, *b))
             }
-            (Property::Scale, LocalTransform::Trs { scale, .. }) => scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b)),
+            (Property::Scale, LocalTransform::Trs { scale, .. }) => {
+                scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b))
+            }
             (Property::Rotation, LocalTransform::Trs { rotation, .. }) => {
                 let q = glam::DVec4::from_array([0, 1, 2, 3].map(|i| v.get(i).map_or(0.0, |&x| f64::from(x))));
                 // within a millionth of a radian

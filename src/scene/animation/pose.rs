@@ -216,7 +216,9 @@ impl AnimationRig {
     fn live(&self, animation: usize, live: &mut Vec<bool>) -> Result<&Animation> {
         let Some(playing) = self.parts.animations.get(animation) else {
             let count = self.parts.animations.len();
-            return Err(Error::Usage(format!("animation {animation} does not exist: the scene has {count}, counted from 0")));
+            return Err(Error::Usage(format!(
+                "animation {animation} does not exist: the scene has {count}, counted from 0"
+            )));
         };
         live.clear();
         live.resize(self.parts.nodes.len(), false);
@@ -238,7 +240,8 @@ impl AnimationRig {
     pub(super) fn moving_instances(&self, count: usize) -> Vec<bool> {
         // at once for all animations: a file may have as many as nodes
         let mut live = vec![false; self.parts.nodes.len()];
-        let channels = self.parts.animations.iter().zip(&self.still).flat_map(|(a, still)| a.channels.iter().zip(still));
+        let channels =
+            self.parts.animations.iter().zip(&self.still).flat_map(|(a, still)| a.channels.iter().zip(still));
         for (channel, still) in channels {
             live[channel.node] |= !still && channel.property != Property::Weights;
         }
@@ -249,7 +252,11 @@ impl AnimationRig {
     }
 
     /// The instances, cameras or lights on moving nodes, each with its node.
-    fn moved<'a>(&self, carried: &'a [Option<usize>], live: &'a [bool]) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+    fn moved<'a>(
+        &self,
+        carried: &'a [Option<usize>],
+        live: &'a [bool],
+    ) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
     }
 
@@ -272,7 +279,12 @@ impl AnimationRig {
 
     /// The joint matrices of a mesh's skin, given the nodes' world transforms; none without a skin.
     /// Of each skin they are computed once: `known` has a place for each.
-    fn joints<'a>(&self, deformation: &Deformation, world: &[DAffine3], known: &'a mut [Vec<DAffine3>]) -> &'a [DAffine3] {
+    fn joints<'a>(
+        &self,
+        deformation: &Deformation,
+        world: &[DAffine3],
+        known: &'a mut [Vec<DAffine3>],
+    ) -> &'a [DAffine3] {
         let Some(number) = deformation.skin else { return &[] };
         let (skin, anchor) = (&self.parts.skins[number], self.anchor(number));
         let out = &mut known[number];
@@ -342,7 +354,8 @@ impl AnimationRig {
             *extent = extent.max(deformation.extent(base));
         }
         // a mesh that is a point in every shape may have any scale
-        let floor = |mesh: usize| Some(1e-7 * size / extents[mesh]).filter(|f| *f > 0.0 && f.is_finite()).unwrap_or(1e-7);
+        let floor =
+            |mesh: usize| Some(1e-7 * size / extents[mesh]).filter(|f| *f > 0.0 && f.is_finite()).unwrap_or(1e-7);
         rig.floors = scene.instances.iter().map(|i| floor(i.mesh)).collect();
         place(&rig, scene);
 

@@ -82,7 +82,11 @@ impl Sampler {
             return Err(format!("the time of key {k} is not finite"));
         }
         if let Some(k) = self.times.windows(2).position(|t| t[0] > t[1]) {
-            return Err(format!("the time of key {} ({} s) is before that of the key before it", k + 1, self.times[k + 1]));
+            return Err(format!(
+                "the time of key {} ({} s) is before that of the key before it",
+                k + 1,
+                self.times[k + 1]
+            ));
         }
         let wanted = keys.checked_mul(width * self.stride());
         if wanted != Some(self.values.len()) {

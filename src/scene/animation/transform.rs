@@ -16,7 +16,9 @@ pub(in crate::scene) fn anchor(joint: &DAffine3) -> DVec3 {
 pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
     let mut columns = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis];
     let longest = |columns: &[DVec3; 3], of: &[usize], along: &dyn Fn(DVec3) -> DVec3| {
-        of.iter().copied().max_by(|&a, &b| along(columns[a]).length_squared().total_cmp(&along(columns[b]).length_squared()))
+        of.iter()
+            .copied()
+            .max_by(|&a, &b| along(columns[a]).length_squared().total_cmp(&along(columns[b]).length_squared()))
     };
     let a = longest(&columns, &[0, 1, 2], &|c| c).unwrap_or(0);
     let Some(first) = columns[a].try_normalize().filter(|_| columns[a].length() >= floor) else {
@@ -54,8 +56,12 @@ mod tests {
         let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.0));
         let floor = 1e-6;
         let skew = DMat3::from_cols(DVec3::X, DVec3::new(1.0, 1e-9, 0.0), DVec3::new(2.0, 0.0, 0.0));
-        for scale in [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 1.0], [3.0, 2.0, 0.0], [1e-9, -1e-9, 1e-12], [5.0, 1e-9, -2.0]] {
-            for m in [DMat3::from_diagonal(DVec3::from_array(scale)), skew * DMat3::from_diagonal(DVec3::from_array(scale))] {
+        for scale in
+            [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 1.0], [3.0, 2.0, 0.0], [1e-9, -1e-9, 1e-12], [5.0, 1e-9, -2.0]]
+        {
+            for m in
+                [DMat3::from_diagonal(DVec3::from_array(scale)), skew * DMat3::from_diagonal(DVec3::from_array(scale))]
+            {
                 let t = DAffine3::from_mat3_translation(turn * m, DVec3::new(1.0, 2.0, 3.0));
                 let fixed = at_least(&t, floor);
                 let inverse = fixed.matrix3.inverse();
@@ -74,6 +80,9 @@ mod tests {
     #[test]
     fn anchors_are_zero_near_the_origin() {
         assert_eq!(anchor(&DAffine3::from_translation(DVec3::new(500.0, -500.0, 3.0))), DVec3::ZERO);
-        assert_eq!(anchor(&DAffine3::from_translation(DVec3::new(1e6, 0.0, -1024.5))), DVec3::new(1000448.0, 0.0, -1024.0));
+        assert_eq!(
+            anchor(&DAffine3::from_translation(DVec3::new(1e6, 0.0, -1024.5))),
+            DVec3::new(1000448.0, 0.0, -1024.0)
+        );
     }
 }

@@ -8,7 +8,14 @@ use glam::{DVec3, Vec3};
 
 const GREY: Vec3 = Vec3::new(0.73, 0.73, 0.73);
 
-fn scene_of(name: &str, parts: Vec<(&str, Geometry)>, eye: DVec3, target: DVec3, fov_y: f64, at: SceneTransform) -> Scene {
+fn scene_of(
+    name: &str,
+    parts: Vec<(&str, Geometry)>,
+    eye: DVec3,
+    target: DVec3,
+    fov_y: f64,
+    at: SceneTransform,
+) -> Scene {
     let mut scene = Scene { name: name.to_owned(), ..Scene::default() };
     let grey = scene.add_matte("grey", GREY);
     for (part, geometry) in parts {
@@ -48,8 +55,10 @@ pub fn v_groove(angle: f64, length: f64, width: f64, at: SceneTransform) -> Scen
 /// An analytic sphere with its centre `height` above the middle of a horizontal square of side
 /// `side`.
 pub fn sphere_over_plane(radius: f64, height: f64, side: f64, at: SceneTransform) -> Scene {
-    let parts =
-        vec![("plane", shapes::floor(DVec3::ZERO, side)), ("sphere", shapes::sphere(DVec3::new(0.0, height, 0.0), radius))];
+    let parts = vec![
+        ("plane", shapes::floor(DVec3::ZERO, side)),
+        ("sphere", shapes::sphere(DVec3::new(0.0, height, 0.0), radius)),
+    ];
     let eye = DVec3::new(1.5 * radius, height + 1.5 * radius, 5.5 * radius);
     scene_of("sphere-over-plane", parts, eye, DVec3::new(0.0, height * 0.6, 0.0), 40.0, at)
 }

@@ -89,7 +89,8 @@ fn add_arcades(scene: &mut Scene, stone: usize) {
         // a storey has columns of its own height
         let (floor, ceiling) = (LEVELS[storey], LEVELS[storey + 1] - SLAB);
         let spring = floor + 0.62 * (ceiling - floor);
-        let column = scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18, FLUTED), stone);
+        let column =
+            scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18, FLUTED), stone);
         for side in 0..4u32 {
             let (along, across) = ((side % 2) as usize, 1 - (side % 2) as usize);
             let turn = DAffine3::from_rotation_y(f64::from(side) * PI / 2.0);
@@ -150,14 +151,20 @@ fn add_furniture(scene: &mut Scene, [stone, cloth, leaf]: [usize; 3]) {
         scene.add_instance("pot", pot, DAffine3::from_translation(at));
         for _ in 0..5 {
             let to = at + DVec3::new(rng.range(-0.3, 0.3), rng.range(0.95, 1.5), rng.range(-0.3, 0.3));
-            let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(rng.range(0.6, 1.1)), rng.rotation(), to);
+            let transform =
+                DAffine3::from_scale_rotation_translation(DVec3::splat(rng.range(0.6, 1.1)), rng.rotation(), to);
             scene.add_instance("shrub", shrub, transform);
         }
     }
     let ring = shapes::torus(1.35, 0.16, 64, 16);
     let turn = DAffine3::from_rotation_translation(DQuat::IDENTITY, DVec3::new(1.5, 0.42, 0.0));
     scene.add_object("basin's rim", ring, stone, turn);
-    scene.add_object("basin", shapes::cylinder(1.32, 0.44, 64), stone, DAffine3::from_translation(DVec3::new(1.5, -0.04, 0.0)));
+    scene.add_object(
+        "basin",
+        shapes::cylinder(1.32, 0.44, 64),
+        stone,
+        DAffine3::from_translation(DVec3::new(1.5, -0.04, 0.0)),
+    );
 }
 
 /// Radius and height of points of a baluster.
@@ -176,8 +183,17 @@ const BALUSTER: [[f64; 2]; 11] = [
 ];
 
 /// Radius and height of points of a pot.
-const POT: [[f64; 2]; 9] =
-    [[0.3, -0.02], [0.3, 0.08], [0.22, 0.12], [0.3, 0.3], [0.44, 0.62], [0.46, 0.8], [0.52, 0.84], [0.52, 0.9], [0.4, 0.88]];
+const POT: [[f64; 2]; 9] = [
+    [0.3, -0.02],
+    [0.3, 0.08],
+    [0.22, 0.12],
+    [0.3, 0.3],
+    [0.44, 0.62],
+    [0.46, 0.8],
+    [0.52, 0.84],
+    [0.52, 0.9],
+    [0.4, 0.88],
+];
 
 /// Points of a column's profile around which it has grooves: the shaft without its ends.
 const FLUTED: std::ops::Range<usize> = 8..17;
@@ -185,7 +201,8 @@ const FLUTED: std::ops::Range<usize> = 8..17;
 /// Radius and height of points of a column: base, a shaft that tapers, capital. Points 7 to 17 are
 /// the shaft.
 fn column_profile(height: f64) -> Vec<[f64; 2]> {
-    let mut profile = vec![[0.36, -0.02], [0.36, 0.14], [0.33, 0.16], [0.35, 0.2], [0.35, 0.25], [0.31, 0.29], [0.28, 0.34]];
+    let mut profile =
+        vec![[0.36, -0.02], [0.36, 0.14], [0.33, 0.16], [0.35, 0.2], [0.35, 0.25], [0.31, 0.29], [0.28, 0.34]];
     let (bottom, top) = (0.36, height - 0.5);
     for k in 0..11 {
         let t = f64::from(k) / 10.0;

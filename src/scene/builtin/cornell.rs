@@ -38,8 +38,10 @@ fn block((base, height): ([[f64; 2]; 4], f64)) -> Geometry {
 fn closed_block((base, height): ([[f64; 2]; 4], f64)) -> Geometry {
     let at = |k: usize, y: f64| mm(base[k % 4][0], y, base[k % 4][1]);
     let [top, bottom] = [height, 1.0];
-    let mut faces =
-        vec![[at(0, top), at(1, top), at(2, top), at(3, top)], [at(3, bottom), at(2, bottom), at(1, bottom), at(0, bottom)]];
+    let mut faces = vec![
+        [at(0, top), at(1, top), at(2, top), at(3, top)],
+        [at(3, bottom), at(2, bottom), at(1, bottom), at(0, bottom)],
+    ];
     faces.extend((0..4).map(|k| [at(k, bottom), at(k + 1, bottom), at(k + 1, top), at(k, top)]));
     shapes::quads(&faces)
 }
@@ -88,11 +90,19 @@ fn walls(name: &str) -> Scene {
     });
     let parts = [
         ("floor", white, [mm(552.8, 0.0, 0.0), mm(0.0, 0.0, 0.0), mm(0.0, 0.0, 559.2), mm(549.6, 0.0, 559.2)]),
-        ("ceiling", white, [mm(556.0, 548.8, 0.0), mm(556.0, 548.8, 559.2), mm(0.0, 548.8, 559.2), mm(0.0, 548.8, 0.0)]),
+        (
+            "ceiling",
+            white,
+            [mm(556.0, 548.8, 0.0), mm(556.0, 548.8, 559.2), mm(0.0, 548.8, 559.2), mm(0.0, 548.8, 0.0)],
+        ),
         ("back", white, [mm(549.6, 0.0, 559.2), mm(0.0, 0.0, 559.2), mm(0.0, 548.8, 559.2), mm(556.0, 548.8, 559.2)]),
         ("right", green, [mm(0.0, 0.0, 559.2), mm(0.0, 0.0, 0.0), mm(0.0, 548.8, 0.0), mm(0.0, 548.8, 559.2)]),
         ("left", red, [mm(552.8, 0.0, 0.0), mm(549.6, 0.0, 559.2), mm(556.0, 548.8, 559.2), mm(556.0, 548.8, 0.0)]),
-        ("light", light, [mm(343.0, 548.0, 227.0), mm(343.0, 548.0, 332.0), mm(213.0, 548.0, 332.0), mm(213.0, 548.0, 227.0)]),
+        (
+            "light",
+            light,
+            [mm(343.0, 548.0, 227.0), mm(343.0, 548.0, 332.0), mm(213.0, 548.0, 332.0), mm(213.0, 548.0, 227.0)],
+        ),
     ];
     for (part, material, corners) in parts {
         scene.add_object(part, shapes::quads(&[corners]), material, DAffine3::IDENTITY);

@@ -60,7 +60,8 @@ fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
             let inside = (width - across) * size as f32 / 6.0 + 0.5;
             let stem = (0.012 - across) * size as f32 / 3.0 + 0.5;
             let alpha = if (0.0..=1.0).contains(&along) { inside.max(stem) } else { 0.0 };
-            let rib = if across < 0.012 || ((along * 9.0 - across * 6.0).fract() - 0.5).abs() < 0.06 { 1.25 } else { 1.0 };
+            let rib =
+                if across < 0.012 || ((along * 9.0 - across * 6.0).fract() - 0.5).abs() < 0.06 { 1.25 } else { 1.0 };
             let shade = |c: f32| (c * rib * (0.8 + 0.2 * along)).min(255.0) as u8;
             rgba8.extend([shade(70.0), shade(130.0), shade(45.0), (alpha.clamp(0.0, 1.0) * 255.0).round() as u8]);
         }
@@ -73,7 +74,8 @@ fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
 fn tuft(rng: &mut Rng, count: u32, span: f32, alpha: bool) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for k in 0..count {
-        let turn = DQuat::from_rotation_y(rng.range(0.0, std::f64::consts::TAU)) * DQuat::from_rotation_x(rng.range(-1.2, 0.5));
+        let turn = DQuat::from_rotation_y(rng.range(0.0, std::f64::consts::TAU))
+            * DQuat::from_rotation_x(rng.range(-1.2, 0.5));
         let (size, from) =
             (rng.range(0.5, 0.9), DVec3::new(rng.range(-0.35, 0.35), rng.range(0.05, 0.5), rng.range(-0.35, 0.35)));
         for (x, y) in [(0.0f32, 0.0f32), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
@@ -118,7 +120,12 @@ pub fn leaf_cards() -> Scene {
         (leaf("masked", Vec4::ONE, slot(0, Affine2::IDENTITY), AlphaMode::Mask { cutoff: 0.5 }), 1.0, false),
         (leaf("nearest", Vec4::ONE, slot(1, turned), AlphaMode::Mask { cutoff: 0.5 }), 1.5, false),
         (
-            leaf("mirrored", Vec4::new(1.0, 0.9, 0.6, 1.0), slot(2, Affine2::IDENTITY), AlphaMode::Mask { cutoff: 0.3 }),
+            leaf(
+                "mirrored",
+                Vec4::new(1.0, 0.9, 0.6, 1.0),
+                slot(2, Affine2::IDENTITY),
+                AlphaMode::Mask { cutoff: 0.3 },
+            ),
             2.0,
             true,
         ),
@@ -157,7 +164,8 @@ pub fn stairs(offset: DVec3) -> Scene {
     );
     // Each step is a block down to below the floor: no two faces coincide.
     let (steps, rise, run) = (12, 0.18, 0.3);
-    let step = scene.add_mesh("step", shapes::cuboid(DVec3::new(0.0, -0.05, -1.51), DVec3::new(run - 0.002, 1.0, 0.6)), stone);
+    let step =
+        scene.add_mesh("step", shapes::cuboid(DVec3::new(0.0, -0.05, -1.51), DVec3::new(run - 0.002, 1.0, 0.6)), stone);
     let pole = scene.add_mesh("pole", shapes::cylinder(0.025, 0.9, 16), wood);
     for k in 0..steps {
         let (x, y) = (k as f64 * run - 1.8, (k + 1) as f64 * rise);
@@ -172,7 +180,12 @@ pub fn stairs(offset: DVec3) -> Scene {
     scene.add_object("column", shapes::cylinder(0.35, 4.5, 48), plaster, at(DVec3::new(-2.6, -0.01, 1.2)));
     scene.add_object("ring", shapes::torus(0.4, 0.08, 48, 16), plaster, at(DVec3::new(-2.6, 0.08, 1.2)));
     scene.add_object("ball", shapes::icosphere(0.3, 4), wood, at(DVec3::new(0.4, 0.299, 1.3)));
-    scene.add_object("marble", shapes::sphere(DVec3::ZERO, 0.12), plaster, at(DVec3::new(-1.35, 0.18 * 2.0 + 0.12, 0.1)));
+    scene.add_object(
+        "marble",
+        shapes::sphere(DVec3::ZERO, 0.12),
+        plaster,
+        at(DVec3::new(-1.35, 0.18 * 2.0 + 0.12, 0.1)),
+    );
     let crate_turn = DAffine3::from_rotation_y(0.5);
     let crate_box = shapes::cuboid(DVec3::new(-0.35, -0.001, -0.35), DVec3::new(0.35, 0.7, 0.35));
     scene.add_object("crate", crate_box, wood, at(DVec3::new(1.6, 0.0, 1.4)) * crate_turn);

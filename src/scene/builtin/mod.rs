@@ -47,17 +47,26 @@ const NAMES: &[BuiltinInfo] = &[
         "the Cornell boxes of Coello (2024) under a white sky: matte, with a box of metal, glossy (coello:N, 1 to 3, default 1)",
     ),
     info("sphere-over-plane", "an analytic sphere that floats over a plane; AO has a closed form"),
-    info("v-groove", "two walls that meet at ANGLE degrees (v-groove:ANGLE, 1 to 180, default 90); AO is (1 - cos ANGLE) / 2"),
+    info(
+        "v-groove",
+        "two walls that meet at ANGLE degrees (v-groove:ANGLE, 1 to 180, default 90); AO is (1 - cos ANGLE) / 2",
+    ),
     info("closed-box", "the inside of a closed box; AO is 0 everywhere"),
     info("parallel-planes", "a floor and a ceiling; AO has a closed form"),
     info("plane", "a single plane; AO is 1 everywhere"),
     info("grid", "N x N x N rotated and scaled instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
     info("spheres", "N random analytic spheres over a floor (spheres:N, 1 to 10000000, default 1000)"),
     info("terrain", "a fractal landscape of N triangles (terrain:N, 2 to 100000000, default 100000)"),
-    info("instances", "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
+    info(
+        "instances",
+        "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)",
+    ),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
     info("atrium", "an arcaded courtyard of two storeys, open to the sky: about as many triangles as Sponza"),
-    info("room", "a furnished room of about N triangles, closed but for a window (room:N, 10000 to 5000000, default 40000)"),
+    info(
+        "room",
+        "a furnished room of about N triangles, closed but for a window (room:N, 10000 to 5000000, default 40000)",
+    ),
     info("stairs", "stairs, a column and a rail: contact detail"),
     info("parade", "an animation of two seconds: moving blocks, a rotor, a skinned column, a ball with morph targets"),
     info("pendulum", "an animation of two seconds: the Cornell box, whose lamp swings on a rod"),
@@ -99,7 +108,8 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         None => Some(default),
         Some(p) => p.parse::<u32>().ok().filter(|v| (lo..=hi).contains(v)),
     };
-    let with = |make: fn(u32) -> Scene, n: Option<u32>| n.map(|n| Box::new(move || make(n)) as Box<dyn FnOnce() -> Scene>);
+    let with =
+        |make: fn(u32) -> Scene, n: Option<u32>| n.map(|n| Box::new(move || make(n)) as Box<dyn FnOnce() -> Scene>);
 
     // scenes that take a parameter
     match base {
@@ -174,7 +184,8 @@ mod tests {
         for name in ["terrain:100000000", "spheres:10000000", "instances:250", "v-groove:1", "grid:128"] {
             assert!(exists(name), "{name}");
         }
-        for name in ["", "nothing", "plane:1", "terrain:1", "terrain:", "terrain:1e3", "grid:129", "v-groove:nan", "spheres:0"]
+        for name in
+            ["", "nothing", "plane:1", "terrain:1", "terrain:", "terrain:1e3", "grid:129", "v-groove:nan", "spheres:0"]
         {
             assert!(!exists(name), "{name}");
             assert!(by_name(name).is_none(), "{name}");

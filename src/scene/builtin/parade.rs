@@ -8,8 +8,8 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 use super::shapes;
 use crate::scene::animation::{
-    Animation, Channel, Deformation, Influences, Interpolation, LocalTransform, MorphTarget, Node, Property, RigParts, Sampler,
-    Skin,
+    Animation, Channel, Deformation, Influences, Interpolation, LocalTransform, MorphTarget, Node, Property, RigParts,
+    Sampler, Skin,
 };
 use crate::scene::{AnimationRig, Camera, Geometry, Scene, TriangleMesh};
 
@@ -35,7 +35,12 @@ pub fn parade() -> Scene {
     scene.add_object("floor", shapes::floor(DVec3::ZERO, 8.0), grey, DAffine3::IDENTITY);
     stage.parts.instances.push(None);
     let block = scene.add_mesh("block", shapes::cuboid(DVec3::splat(-0.3), DVec3::splat(0.3)), red);
-    scene.add_object("wall", shapes::cuboid(DVec3::new(-3.0, 0.0, -2.4), DVec3::new(3.0, 1.2, -2.2)), grey, DAffine3::IDENTITY);
+    scene.add_object(
+        "wall",
+        shapes::cuboid(DVec3::new(-3.0, 0.0, -2.4), DVec3::new(3.0, 1.2, -2.2)),
+        grey,
+        DAffine3::IDENTITY,
+    );
     stage.parts.instances.push(None);
 
     // slides to and fro, and turns once; a smaller one rides on it
@@ -53,7 +58,8 @@ pub fn parade() -> Scene {
     let hub = scene.add_mesh("hub", shapes::torus(0.18, 0.09, 24, 12), blue);
     stage.place(&mut scene, axle, hub);
     stage.turn(axle, DVec3::NEG_Y);
-    let blade = scene.add_mesh("blade", shapes::cuboid(DVec3::new(0.2, -0.03, -0.12), DVec3::new(1.0, 0.03, 0.12)), blue);
+    let blade =
+        scene.add_mesh("blade", shapes::cuboid(DVec3::new(0.2, -0.03, -0.12), DVec3::new(1.0, 0.03, 0.12)), blue);
     for k in 0..3 {
         let arm = stage.node("arm", Some(axle), DVec3::ZERO);
         let rotation = DQuat::from_rotation_y(TAU * f64::from(k) / 3.0) * DQuat::from_rotation_x(0.4);
@@ -82,7 +88,8 @@ pub fn parade() -> Scene {
     stage.parts.cameras.push(Some(cart));
 
     // the second animation has the bending alone
-    let bends = stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
+    let bends =
+        stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
     let animation = |name: &str, channels| Animation { name: name.to_owned(), duration: DURATION, channels };
     stage.parts.animations = vec![animation("parade", std::mem::take(&mut stage.channels)), animation("bend", bends)];
     // valid by construction; otherwise the scene has no rig, and tests fail
@@ -133,7 +140,9 @@ impl RigBuilder {
     }
 
     fn line(&mut self, node: usize, property: Property, keys: u32, value: impl Fn(f64) -> Vec<f64>) {
-        self.keys(node, property, Interpolation::Linear, keys, |k| value(DURATION * f64::from(k) / f64::from(keys - 1)));
+        self.keys(node, property, Interpolation::Linear, keys, |k| {
+            value(DURATION * f64::from(k) / f64::from(keys - 1))
+        });
     }
 
     /// Splines whose tangents are the slopes of `value`.
@@ -148,7 +157,9 @@ impl RigBuilder {
 
     /// Once around.
     fn turn(&mut self, node: usize, axis: DVec3) {
-        self.line(node, Property::Rotation, 5, |t| DQuat::from_axis_angle(axis, TAU * t / DURATION).to_array().to_vec());
+        self.line(node, Property::Rotation, 5, |t| {
+            DQuat::from_axis_angle(axis, TAU * t / DURATION).to_array().to_vec()
+        });
     }
 
     /// A column on three joints.

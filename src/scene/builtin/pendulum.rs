@@ -32,7 +32,9 @@ pub fn pendulum() -> Scene {
         cameras: vec![None; scene.cameras.len()],
         ..RigParts::default()
     };
-    let hook = scene.bounds().map_or(DVec3::ZERO, |(lo, hi)| DVec3::new(0.5 * (lo.x + hi.x), hi.y, lo.z + 0.4 * (hi.z - lo.z)));
+    let hook = scene
+        .bounds()
+        .map_or(DVec3::ZERO, |(lo, hi)| DVec3::new(0.5 * (lo.x + hi.x), hi.y, lo.z + 0.4 * (hi.z - lo.z)));
     let local = LocalTransform::Trs { translation: hook, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
     parts.nodes.push(Node { name: "pendulum".to_owned(), local, ..Node::default() });
     let light = scene.add_material(Material { name: "lamp".to_owned(), emissive: LIGHT, ..Material::default() });

@@ -21,7 +21,8 @@ impl Rng {
 
     /// A uniformly distributed rotation (Shoemake 1992).
     pub fn rotation(&mut self) -> glam::DQuat {
-        let (a, b, c) = (self.range(0.0, 1.0), self.range(0.0, std::f64::consts::TAU), self.range(0.0, std::f64::consts::TAU));
+        let (a, b, c) =
+            (self.range(0.0, 1.0), self.range(0.0, std::f64::consts::TAU), self.range(0.0, std::f64::consts::TAU));
         let (p, q) = ((1.0 - a).sqrt(), a.sqrt());
         glam::DQuat::from_xyzw(p * b.sin(), p * b.cos(), q * c.sin(), q * c.cos()).normalize()
     }

@@ -131,8 +131,10 @@ fn add_table(scene: &mut Scene, wood: usize, segments: u32) {
     }
     for k in 0..6 {
         let (row, side) = (f64::from(k % 3) - 1.0, if k < 3 { -1.0 } else { 1.0f64 });
-        let (stand, turn) =
-            (DVec3::new(0.62 * row, 0.0, 0.72 * side), if side < 0.0 { 0.1 * row } else { std::f64::consts::PI + 0.07 * row });
+        let (stand, turn) = (
+            DVec3::new(0.62 * row, 0.0, 0.72 * side),
+            if side < 0.0 { 0.1 * row } else { std::f64::consts::PI + 0.07 * row },
+        );
         let on = |p: DVec3| stand + DQuat::from_rotation_y(turn) * p;
         place("seat", shapes::cuboid(DVec3::new(-0.22, 0.44, -0.22), DVec3::new(0.22, 0.47, 0.22)), stand, turn);
         for (sx, sz) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
@@ -171,7 +173,8 @@ fn add_seats(scene: &mut Scene, cloth: usize, wood: usize, segments: u32) {
     }
     let rug = shapes::curtain(2.2, 1.3, 4 * segments, segments);
     let lay = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
-    let transform = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 1.0, 0.12), lay, DVec3::new(-1.9, 0.012, 1.9));
+    let transform =
+        DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 1.0, 0.12), lay, DVec3::new(-1.9, 0.012, 1.9));
     scene.add_object("rug", rug, cloth, transform);
 }
 
@@ -182,7 +185,12 @@ fn add_lamps(scene: &mut Scene, metal: usize, paper: usize, segments: u32) {
     scene.add_object("pole", shapes::cylinder(0.009, 1.5, segments), metal, at(-3.6, 0.02, 1.6));
     scene.add_object("shade", shapes::lathe(&SHADE, 4 * segments), paper, at(-3.6, 1.35, 1.6));
     scene.add_object("wire", shapes::cylinder(0.003, 0.8, segments), metal, at(0.6, HEIGHT - 0.8, 0.6));
-    scene.add_object("globe", shapes::torus(0.22, 0.06, 4 * segments, 2 * segments), paper, at(0.6, HEIGHT - 0.86, 0.6));
+    scene.add_object(
+        "globe",
+        shapes::torus(0.22, 0.06, 4 * segments, 2 * segments),
+        paper,
+        at(0.6, HEIGHT - 0.86, 0.6),
+    );
 }
 
 /// A pot with leaves that are long, thin and flat.
@@ -232,7 +240,8 @@ fn add_books(scene: &mut Scene, paper: usize, books: u32) {
         let pitch = space / f64::from(mine.max(1));
         for k in 0..mine {
             let lo = DVec3::new(left + pitch * f64::from(k), floor, rng.range(0.0, 0.02) - HALF[1]);
-            let (wide, tall, deep) = (pitch * rng.range(0.8, 0.98), rng.range(0.2, rise - 0.05), rng.range(0.18, depth - 0.06));
+            let (wide, tall, deep) =
+                (pitch * rng.range(0.8, 0.98), rng.range(0.2, rise - 0.05), rng.range(0.18, depth - 0.06));
             scene.add_object("book", shapes::cuboid(lo, lo + DVec3::new(wide, tall, deep)), paper, DAffine3::IDENTITY);
         }
     }

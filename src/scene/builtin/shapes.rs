@@ -37,7 +37,10 @@ pub fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Geometry {
 pub fn cuboid(lo: DVec3, hi: DVec3) -> Geometry {
     let pick = |bit: bool, l: f64, h: f64| if bit { h } else { l };
     let positions = (0..8)
-        .map(|k| DVec3::new(pick(k & 1 != 0, lo.x, hi.x), pick(k & 2 != 0, lo.y, hi.y), pick(k & 4 != 0, lo.z, hi.z)).as_vec3())
+        .map(|k| {
+            DVec3::new(pick(k & 1 != 0, lo.x, hi.x), pick(k & 2 != 0, lo.y, hi.y), pick(k & 4 != 0, lo.z, hi.z))
+                .as_vec3()
+        })
         .collect();
     // corners by bits zyx; each face counter-clockwise from outside
     let faces: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

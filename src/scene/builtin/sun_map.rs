@@ -15,7 +15,8 @@ pub fn sun_map() -> EnvironmentMap {
     let sun = DVec3::new(0.5, 0.6, 0.62).normalize();
     let texel = |k: u32| {
         let (x, y) = (f64::from(k % width) + 0.5, f64::from(k / width) + 0.5);
-        let (phi, theta) = (std::f64::consts::TAU * (x / f64::from(width) - 0.5), std::f64::consts::PI * y / f64::from(height));
+        let (phi, theta) =
+            (std::f64::consts::TAU * (x / f64::from(width) - 0.5), std::f64::consts::PI * y / f64::from(height));
         let d = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
         let sky = if d.y > 0.0 { Vec3::new(0.5, 0.7, 1.0) } else { Vec3::new(0.3, 0.25, 0.2) };
         // half a degree across, and no less than a texel

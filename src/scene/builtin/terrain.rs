@@ -104,7 +104,8 @@ pub fn instances(n: u32) -> Scene {
     let mut scene = Scene { name: "instances".to_owned(), ..Scene::default() };
     let earth = scene.add_matte("earth", Vec3::new(0.5, 0.45, 0.38));
     let each = (n / PLACES).max(2);
-    let pieces: Vec<_> = (0..PIECES).map(|k| scene.add_mesh("land", mesh(hash_combine(0x1a4d, k), each), earth)).collect();
+    let pieces: Vec<_> =
+        (0..PIECES).map(|k| scene.add_mesh("land", mesh(hash_combine(0x1a4d, k), each), earth)).collect();
     let mut rng = Rng::new(0x17_57a7);
     for k in 0..PLACES {
         // each piece shrinks to an island of about a fifth of the whole; they overlap, as scattered
@@ -113,7 +114,8 @@ pub fn instances(n: u32) -> Scene {
         let turn = DAffine3::from_rotation_y(rng.range(0.0, std::f64::consts::TAU))
             * DAffine3::from_rotation_x(rng.range(-0.25, 0.25))
             * DAffine3::from_rotation_z(rng.range(-0.25, 0.25));
-        let scale = DAffine3::from_scale(DVec3::new(rng.range(0.15, 0.25), rng.range(0.15, 0.4), rng.range(0.15, 0.25)));
+        let scale =
+            DAffine3::from_scale(DVec3::new(rng.range(0.15, 0.25), rng.range(0.15, 0.4), rng.range(0.15, 0.25)));
         scene.add_instance("land", pieces[(k % PIECES) as usize], DAffine3::from_translation(at) * turn * scale);
     }
     scene.add_camera(DVec3::new(8.0, 26.0, 52.0), DVec3::new(0.0, -2.0, 0.0), 50.0);

@@ -13,7 +13,8 @@ use super::{ExportStats, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::VertexData;
 use crate::scene::{
-    Camera, ClipPlanes, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
+    Camera, ClipPlanes, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture,
+    TriangleMesh, Wrap,
 };
 
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin`
@@ -99,7 +100,8 @@ pub fn is_companion_of(path: &Path, gltf: &Path) -> bool {
     let Ok(text) = crate::files::read_regular(gltf) else { return false };
     let Ok(json) = serde_json::from_slice::<Value>(&text) else { return false };
     let uri = encode(&path.file_name().unwrap_or_default().to_string_lossy());
-    let is_own = json["asset"]["generator"].as_str().is_some_and(|g| g.split(' ').next() == GENERATOR.split(' ').next());
+    let is_own =
+        json["asset"]["generator"].as_str().is_some_and(|g| g.split(' ').next() == GENERATOR.split(' ').next());
     let names = |key: &str| json[key].as_array().into_iter().flatten().any(|file| file["uri"].as_str() == Some(&uri));
     is_own && (names("buffers") || names("images"))
 }
@@ -294,7 +296,12 @@ impl Writer {
 
     /// Appends an accessor of `N` floats an element; `target`: what its buffer view is for, if it
     /// is for vertices.
-    fn numbers<const N: usize>(&mut self, values: impl Iterator<Item = [f32; N]>, bounds: bool, target: Option<u32>) -> usize {
+    fn numbers<const N: usize>(
+        &mut self,
+        values: impl Iterator<Item = [f32; N]>,
+        bounds: bool,
+        target: Option<u32>,
+    ) -> usize {
         let (mut bytes, mut count) = (Vec::new(), 0);
         let (mut min, mut max) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
         for value in values {
@@ -423,7 +430,8 @@ fn sampler(texture: &Texture) -> Value {
 
 /// A copy of a posed mesh with its undeformed vertices.
 fn undeformed(posed: &TriangleMesh, shape: &VertexData) -> TriangleMesh {
-    let VertexData { positions, normals, tangents: [tangents, clearcoat_tangents, anisotropy_tangents] } = shape.clone();
+    let VertexData { positions, normals, tangents: [tangents, clearcoat_tangents, anisotropy_tangents] } =
+        shape.clone();
     TriangleMesh { positions, normals, tangents, clearcoat_tangents, anisotropy_tangents, ..posed.clone() }
 }
 
@@ -462,7 +470,8 @@ fn camera(camera: &Camera, nothing: ClipPlanes) -> Value {
     let far = if clip.far.is_finite() { clip.far } else { nothing.far };
     match camera.projection {
         Projection::Perspective { fov_y } => {
-            let mut perspective = json!({ "yfov": fov_y, "znear": if clip.near > 0.0 { clip.near } else { nothing.near } });
+            let mut perspective =
+                json!({ "yfov": fov_y, "znear": if clip.near > 0.0 { clip.near } else { nothing.near } });
             if clip.far.is_finite() {
                 perspective["zfar"] = json!(clip.far);
             }

@@ -33,7 +33,8 @@ pub fn mesh_bin(scene: &Scene) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
         return Err(Error::Scene(format!("{}: {vertices} vertices are too many for MESH.bin", scene.name)));
     }
     let mut positions = Vec::with_capacity(vertices);
-    let mut indices: Vec<[u32; 3]> = Vec::with_capacity((scene.triangle_count() + spheres * ball.1.len() as u64) as usize);
+    let mut indices: Vec<[u32; 3]> =
+        Vec::with_capacity((scene.triangle_count() + spheres * ball.1.len() as u64) as usize);
     let mut append = |to_world: &DAffine3, from: &mut dyn Iterator<Item = Vec3>, triangles: &[[u32; 3]]| {
         let first = positions.len() as u32;
         // identity must not round
@@ -124,7 +125,10 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
         ));
     }
     if let Some(t) = indices.iter().position(|t| t.iter().any(|&i| i >= nv)) {
-        return Err(Error::input(path, format!("triangle {t} refers to a vertex beyond the last, {}", nv.saturating_sub(1))));
+        return Err(Error::input(
+            path,
+            format!("triangle {t} refers to a vertex beyond the last, {}", nv.saturating_sub(1)),
+        ));
     }
 
     // a scene of one mesh

@@ -74,7 +74,8 @@ pub fn load_camera_path(path: &Path) -> Result<CameraPath> {
     let file: PathJson =
         serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a readable camera path: {e}")))?;
     let key = |(k, value): (usize, Value)| {
-        let key: KeyJson = serde_json::from_value(value).map_err(|e| Error::input(path, format!("key {}: {e}", k + 1)))?;
+        let key: KeyJson =
+            serde_json::from_value(value).map_err(|e| Error::input(path, format!("key {}: {e}", k + 1)))?;
         let (eye, target, up) = (DVec3::from(key.eye), DVec3::from(key.target), DVec3::from(key.up));
         Ok(Key { frame: key.frame, eye, target, up, fov_y: key.fov_y_degrees.to_radians(), cut: key.cut })
     };

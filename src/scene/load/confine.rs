@@ -89,7 +89,11 @@ pub fn check(folder: &Path, owner: &Path, path: &Path) -> Result<()> {
         return if leaves(folder, &from, name) { refuse() } else { Ok(()) };
     };
     let mut inside = fs::read_dir(&real).into_iter().flatten().flatten();
-    if inside.any(|file| fs::canonicalize(file.path()).is_ok_and(|real| !real.starts_with(folder))) { refuse() } else { Ok(()) }
+    if inside.any(|file| fs::canonicalize(file.path()).is_ok_and(|real| !real.starts_with(folder))) {
+        refuse()
+    } else {
+        Ok(())
+    }
 }
 
 #[cfg(all(test, unix))]
@@ -109,7 +113,9 @@ mod tests {
         std::os::unix::fs::symlink("..", folder.join("up")).unwrap();
         std::os::unix::fs::symlink("maps/b", folder.join("inner")).unwrap();
         let out = |from: &str, name: &str| leaves(&folder, &folder.join(from), Path::new(name));
-        for name in ["../secret", "../none", "/etc/passwd", "/none", "link", "up/secret", "maps/../../secret", "../scene/a"] {
+        for name in
+            ["../secret", "../none", "/etc/passwd", "/none", "link", "up/secret", "maps/../../secret", "../scene/a"]
+        {
             assert!(out("", name), "{name}");
         }
         for name in ["a", "none", "maps/b", "maps/../a", "./a", "inner", "maps/none/../b"] {

@@ -227,7 +227,8 @@ mod tests {
 
     /// An image of a pixel whose channels are numbered from 0.
     fn image(names: &[&str]) -> Image {
-        let channel = |(k, name): (usize, &&str)| Channel { name: (*name).into(), samples: Samples::F32(vec![k as f32]) };
+        let channel =
+            |(k, name): (usize, &&str)| Channel { name: (*name).into(), samples: Samples::F32(vec![k as f32]) };
         Image { width: 1, height: 1, channels: names.iter().enumerate().map(channel).collect(), metadata: Vec::new() }
     }
 
@@ -243,8 +244,14 @@ mod tests {
         assert_eq!(picked(&["Y"]), [0.0]);
         assert_eq!(picked(&["A", "y", "depth.Z"]), [1.0]);
         assert_eq!(picked(&["Combined.A", "Combined.B", "Combined.G", "Combined.R"]), [3.0, 2.0, 1.0]);
-        let layers =
-            ["View.Combined.B", "View.Combined.G", "View.Combined.R", "View.Diffuse.B", "View.Diffuse.G", "View.Diffuse.R"];
+        let layers = [
+            "View.Combined.B",
+            "View.Combined.G",
+            "View.Combined.R",
+            "View.Diffuse.B",
+            "View.Diffuse.G",
+            "View.Diffuse.R",
+        ];
         assert_eq!(picked(&layers), [2.0, 1.0, 0.0]);
         assert_eq!(picked(&layers[3..]), [2.0, 1.0, 0.0]);
         // without a layer before all others
@@ -262,7 +269,8 @@ mod tests {
         let replaced = |values: &[Vec3]| Replaced::count(values).unwrap().text();
         assert_eq!(replaced(&[Vec3::ONE, Vec3::NEG_ONE]), None);
         assert_eq!(replaced(&[Vec3::splat(infinity)]).unwrap(), "1 pixel is infinite and counts as 65504");
-        let both = replaced(&[Vec3::new(infinity, nan, 1.0), Vec3::new(1.0, nan, 0.0), Vec3::splat(-infinity)]).unwrap();
+        let both =
+            replaced(&[Vec3::new(infinity, nan, 1.0), Vec3::new(1.0, nan, 0.0), Vec3::splat(-infinity)]).unwrap();
         assert_eq!(both, "1 pixel is infinite and counts as 65504, 2 pixels are not a number and count as 0");
         let expected = [infinity, nan, -infinity, -1.0, 1e20].map(admissible);
         assert_eq!(expected, [65504.0, 0.0, 0.0, 0.0, 1e20]);

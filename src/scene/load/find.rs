@@ -49,7 +49,8 @@ impl Finder {
     /// Whether a name that nothing was found for means a file elsewhere.
     fn is_outside(&self, spellings: &[Vec<u8>], own: &[PathBuf]) -> bool {
         let Some(confine) = &self.confine else { return false };
-        let leaves = |folder: &PathBuf| spellings.iter().any(|name| confine::leaves(confine, folder, &text::path(name)));
+        let leaves =
+            |folder: &PathBuf| spellings.iter().any(|name| confine::leaves(confine, folder, &text::path(name)));
         own.iter().any(leaves)
     }
 
@@ -92,7 +93,8 @@ impl Finder {
         // the name as it is written, with and without the folder `models`
         let mut models: Vec<PathBuf> = Vec::new();
         for spelling in spellings.iter().map(|s| text::path(s)) {
-            let other = spelling.strip_prefix("models").map_or_else(|_| Path::new("models").join(&spelling), Path::to_owned);
+            let other =
+                spelling.strip_prefix("models").map_or_else(|_| Path::new("models").join(&spelling), Path::to_owned);
             models.extend([spelling, other]);
         }
         let exact = folders.iter().flat_map(|folder| models.iter().map(move |name| folder.join(name)));

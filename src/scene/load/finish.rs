@@ -38,7 +38,8 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<
         None => (0..scene.meshes.len()).map(|_| None).collect(),
     };
     let meshes = scene.meshes.par_iter_mut().zip(deforming);
-    let notes: Vec<Notes> = meshes.map(|(mesh, deformation)| repair(mesh, &materials[mesh.material], deformation)).collect();
+    let notes: Vec<Notes> =
+        meshes.map(|(mesh, deformation)| repair(mesh, &materials[mesh.material], deformation)).collect();
     for note in notes {
         scene.report.warnings.extend(note.warnings);
         scene.report.degenerate_triangles += note.degenerate;
@@ -71,7 +72,9 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
         Geometry::Spheres(spheres) => {
             let good = |s: &crate::scene::Sphere| s.center.is_finite() && s.radius.is_finite() && s.radius > 0.0;
             return match spheres.iter().position(|s| !good(s)) {
-                Some(i) => Err(format!("sphere {i} has a radius that is not above zero, or a value that is not finite")),
+                Some(i) => {
+                    Err(format!("sphere {i} has a radius that is not above zero, or a value that is not finite"))
+                }
                 None => Ok(()),
             };
         }
@@ -100,7 +103,10 @@ fn texture_slots(scene: &mut Scene) {
         // two sets of texture coordinates are kept; slots that use others get the first
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| s.texcoord > 1) {
             let set = std::mem::take(&mut slot.texcoord);
-            scene.report.warnings.push(format!("texture coordinate set {set} is not supported (0 and 1 are): set 0 is used"));
+            scene
+                .report
+                .warnings
+                .push(format!("texture coordinate set {set} is not supported (0 and 1 are): set 0 is used"));
         }
     }
 }
@@ -149,7 +155,10 @@ fn bake_singular(scene: &mut Scene, budget: &Budget) {
         }
 
         let source = &scene.meshes[instance.mesh];
-        if budget.take(host_bytes(source), || format!("the mesh `{}`, which is scaled to a plane,", source.name)).is_err() {
+        if budget
+            .take(host_bytes(source), || format!("the mesh `{}`, which is scaled to a plane,", source.name))
+            .is_err()
+        {
             return;
         }
         let geometry = match &source.geometry {

@@ -69,7 +69,10 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
             return Ok(scene);
         }
         if extension.is_empty() && !path.exists() {
-            return Err(Error::input(path, "no such file, and no built-in scene of that name (`skylit scenes` lists them)"));
+            return Err(Error::input(
+                path,
+                "no such file, and no built-in scene of that name (`skylit scenes` lists them)",
+            ));
         }
     }
     load_file_with(path, options)

@@ -25,7 +25,9 @@ pub(super) fn read_model(path: &Path, loading: Loading) -> Result<Scene> {
         "obj" => check_start(path).and_then(|()| obj::read(path, loading)),
         "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
         "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
-        other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),
+        other => {
+            Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan")))
+        }
     }
 }
 

@@ -39,7 +39,8 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
     if radiance::is_radiance(bytes) {
         let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE, budget)?;
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
-        let texels = rgb.into_iter().flat_map(|[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect::<Vec<f32>>().into();
+        let texels =
+            rgb.into_iter().flat_map(|[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect::<Vec<f32>>().into();
         return Ok(DecodedImage { width, height, texels });
     }
     let format = image::guess_format(bytes)

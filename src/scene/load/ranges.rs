@@ -148,7 +148,8 @@ mod tests {
 
     /// A material all of whose numbers are this one.
     fn material(value: f32) -> Material {
-        let mut m = Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, mtl_dissolve: Some(1.0), ..Material::default() };
+        let mut m =
+            Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, mtl_dissolve: Some(1.0), ..Material::default() };
         m.parameters.insert("sigma".into(), 0.5);
         numbers(&mut m).into_iter().for_each(|(_, _, values)| values.fill(value));
         m.ior = value;

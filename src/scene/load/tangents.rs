@@ -55,7 +55,8 @@ pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> 
     }
     let (first, others) = textures(material);
     let first = corner_tangents(mesh, first);
-    let [clearcoat, anisotropy] = others.map(|slot| slot.map_or_else(Vec::new, |slot| corner_tangents(mesh, Some(slot))));
+    let [clearcoat, anisotropy] =
+        others.map(|slot| slot.map_or_else(Vec::new, |slot| corner_tangents(mesh, Some(slot))));
     for original in weld(mesh, [&first, &clearcoat, &anisotropy]) {
         source.push(source[original as usize]);
     }
@@ -67,7 +68,8 @@ pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> 
 /// these are the same everywhere, or there is no texture, from the first set that is not. Where
 /// none has a gradient, tangents are [`horizontal`].
 fn corner_tangents(mesh: &TriangleMesh, texture: Option<TextureSlot>) -> Vec<Vec4> {
-    let own = texture.map(|t| (t.texcoord, t.transform)).filter(|(_, transform)| transform.matrix2.determinant() != 0.0);
+    let own =
+        texture.map(|t| (t.texcoord, t.transform)).filter(|(_, transform)| transform.matrix2.determinant() != 0.0);
     let candidates = own.into_iter().chain([0, 1].map(|set| (set, Affine2::IDENTITY)));
     let chosen = candidates.into_iter().find(|(set, _)| varies(&mesh.texcoords[*set]));
     let (set, transform) = chosen.unwrap_or_default();
@@ -164,7 +166,8 @@ impl Corners<'_> {
         let slots = self.mesh.positions.len().next_power_of_two();
         let mut counts = vec![0_u32; slots];
         for (vertex, &count) in triangles_at.iter().enumerate().filter(|(_, count)| **count > 0) {
-            let mix = |hash: u64, bits: u32| (hash ^ u64::from(bits)).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(23);
+            let mix =
+                |hash: u64, bits: u32| (hash ^ u64::from(bits)).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(23);
             let hash = self.key(vertex).into_iter().fold(0, mix);
             counts[hash as usize & (slots - 1)] += count;
         }
@@ -387,7 +390,8 @@ impl Copies {
     }
 
     fn sort(&mut self, vertex: u32, copy: u32) {
-        let cell = self.tangents[copy as usize].map(|t| t.to_array().map(|x| (f64::from(x) / CELL + 0.5).floor() as i32));
+        let cell =
+            self.tangents[copy as usize].map(|t| t.to_array().map(|x| (f64::from(x) / CELL + 0.5).floor() as i32));
         let mut key = [0; 12];
         key.copy_from_slice(cell.as_flattened());
         self.sorted.entry((vertex, key)).or_default().push(copy);

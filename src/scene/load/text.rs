@@ -279,8 +279,9 @@ mod tests {
 
     #[test]
     fn names_are_bytes() {
-        let all: Vec<Vec<u8>> =
-            [&b"r\xe9d"[..], b"r\xe8d", b"r\xc3\xa9d", b"\xc4\xbe\xc4\xbe", b"\x80\xff", b"red"].map(<[u8]>::to_vec).into();
+        let all: Vec<Vec<u8>> = [&b"r\xe9d"[..], b"r\xe8d", b"r\xc3\xa9d", b"\xc4\xbe\xc4\xbe", b"\x80\xff", b"red"]
+            .map(<[u8]>::to_vec)
+            .into();
         let texts: Vec<String> = all.iter().map(|b| from_bytes(b).into_owned()).collect();
         for (bytes, text) in all.iter().zip(&texts) {
             assert_eq!(bytes_of(text).as_ref(), bytes);

@@ -76,8 +76,11 @@ impl Constants {
     pub(super) fn fold_globals(&mut self, module: &mut Module) {
         for instruction in &mut module.types_global_values {
             let (Op::SpecConstantOp, Some(ty)) = (instruction.class.opcode, instruction.result_type) else { continue };
-            let [Operand::LiteralSpecConstantOpInteger(op), operands @ ..] = &instruction.operands[..] else { continue };
-            let values: Vec<_> = operands.iter().map(|o| o.id_ref_any().map_or(Value::Varying, |id| self.value(id))).collect();
+            let [Operand::LiteralSpecConstantOpInteger(op), operands @ ..] = &instruction.operands[..] else {
+                continue;
+            };
+            let values: Vec<_> =
+                operands.iter().map(|o| o.id_ref_any().map_or(Value::Varying, |id| self.value(id))).collect();
             if let (Value::Constant(value), Some(kind)) = (fold(*op, &values), self.kinds.get(&ty)) {
                 *instruction = constant(*kind, ty, instruction.result_id, value);
                 self.add(instruction);

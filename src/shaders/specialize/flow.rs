@@ -105,7 +105,9 @@ impl Flow {
         let branch = block.instructions.last()?;
         let Value::Constant(selector) = self.value(branch.operands.first()?.id_ref_any()?) else { return None };
         let target = match (branch.class.opcode, &branch.operands[1..]) {
-            (Op::BranchConditional, [Operand::IdRef(yes), Operand::IdRef(no), ..]) => *if selector != 0 { yes } else { no },
+            (Op::BranchConditional, [Operand::IdRef(yes), Operand::IdRef(no), ..]) => {
+                *if selector != 0 { yes } else { no }
+            }
             (Op::Switch, [Operand::IdRef(default), cases @ ..]) => {
                 let case = cases.chunks_exact(2).find(|case| case[0] == Operand::LiteralBit32(selector));
                 case.and_then(|case| case[1].id_ref_any()).unwrap_or(*default)

@@ -26,7 +26,9 @@ pub(super) fn fold(op: Op, operands: &[Value]) -> Value {
         _ if operands.contains(&Unseen) => Unseen,
         [Constant(a)] => unary(op, a).map_or(Varying, Constant),
         [Constant(a), Constant(b)] => binary(op, a, b).map_or(Varying, Constant),
-        [Constant(condition), Constant(a), Constant(b)] if op == Op::Select => Constant(if condition != 0 { a } else { b }),
+        [Constant(condition), Constant(a), Constant(b)] if op == Op::Select => {
+            Constant(if condition != 0 { a } else { b })
+        }
         _ => Varying,
     }
 }

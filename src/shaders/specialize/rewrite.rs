@@ -91,7 +91,8 @@ fn is_kept(block: &Block, merge: &Instruction, flow: &Flow, left: &HashSet<u32>)
 fn left_by_others(blocks: &[Block], flow: &Flow) -> HashSet<u32> {
     let selecting = |block: &&Block| block.instructions.last().is_some_and(is_selection);
     let running = blocks.iter().zip(&flow.runs).filter(|(_, runs)| **runs).map(|(block, _)| block);
-    let without_merge = running.filter(selecting).filter(|b| merge_instruction(b).is_none() && flow.only_target(b).is_none());
+    let without_merge =
+        running.filter(selecting).filter(|b| merge_instruction(b).is_none() && flow.only_target(b).is_none());
     without_merge.filter_map(|b| b.instructions.last()).flat_map(targets).collect()
 }
 
@@ -120,7 +121,9 @@ fn aliases(blocks: &[Block], flow: &Flow, constants: &mut Constants) -> HashMap<
             let alias = match (flow.value(id), instruction.class.opcode) {
                 (Value::Constant(value), _) => Some(constants.id(ty, value)),
                 (_, Op::Phi) => only_incoming(instruction, label(block), flow, &aliases),
-                (_, op) => unchanged(op, &flow.operands(instruction)).and_then(|k| instruction.operands[k].id_ref_any()),
+                (_, op) => {
+                    unchanged(op, &flow.operands(instruction)).and_then(|k| instruction.operands[k].id_ref_any())
+                }
             };
             // a value that is made of itself only is never computed
             if let Some(alias) = alias.map(|a| resolve(&aliases, a)).filter(|a| *a != id) {

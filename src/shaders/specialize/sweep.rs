@@ -65,9 +65,10 @@ fn is_pure(instruction: &Instruction, math: Option<u32>) -> bool {
     let op = instruction.class.opcode;
     match op {
         Op::Phi | Op::Undef | Op::AccessChain | Op::InBoundsAccessChain | Op::CopyLogical => true,
-        Op::Load => {
-            !instruction.operands.iter().any(|o| matches!(o, Operand::MemoryAccess(a) if a.contains(MemoryAccess::VOLATILE)))
-        }
+        Op::Load => !instruction
+            .operands
+            .iter()
+            .any(|o| matches!(o, Operand::MemoryAccess(a) if a.contains(MemoryAccess::VOLATILE))),
         Op::ExtInst => match instruction.operands[..] {
             // these two write through a pointer
             [Operand::IdRef(set), Operand::LiteralExtInstInteger(number), ..] => {

@@ -52,7 +52,8 @@ fn assert_valid(words: &[u32], what: &str) {
     let mut merges = HashSet::new();
     for (function, block) in blocks(&module) {
         let label = flow::label(block);
-        let before = function.blocks.iter().filter(|b| flow::targets(b.instructions.last().unwrap()).any(|t| t == label));
+        let before =
+            function.blocks.iter().filter(|b| flow::targets(b.instructions.last().unwrap()).any(|t| t == label));
         let mut before: Vec<u32> = before.map(flow::label).collect();
         before.sort_unstable();
         for phi in block.instructions.iter().filter(|i| i.class.opcode == Op::Phi) {
@@ -61,14 +62,21 @@ fn assert_valid(words: &[u32], what: &str) {
             assert_eq!(from, before, "{what}: a phi has other blocks before it");
         }
         let n = block.instructions.len();
-        let merge = block.instructions[..n - 1].last().filter(|i| matches!(i.class.opcode, Op::SelectionMerge | Op::LoopMerge));
+        let merge =
+            block.instructions[..n - 1].last().filter(|i| matches!(i.class.opcode, Op::SelectionMerge | Op::LoopMerge));
         if let Some(merge) = merge {
             let target = merge.operands[0].id_ref_any().unwrap();
             assert!(merges.insert(target), "{what}: two constructs have one merge block");
             let branch = block.instructions[n - 1].class.opcode;
-            assert!(merge.class.opcode == Op::LoopMerge || branch != Op::Branch, "{what}: a selection without a choice");
+            assert!(
+                merge.class.opcode == Op::LoopMerge || branch != Op::Branch,
+                "{what}: a selection without a choice"
+            );
         }
-        assert!(block.instructions[..n - 1].iter().all(|i| !flow::is_selection(i) && i.class.opcode != Op::Branch), "{what}");
+        assert!(
+            block.instructions[..n - 1].iter().all(|i| !flow::is_selection(i) && i.class.opcode != Op::Branch),
+            "{what}"
+        );
     }
 }
 
@@ -82,8 +90,9 @@ fn every_value_of_the_constants_leaves_valid_modules() {
             let specialized = specialize(&spirv, &all(value), false).unwrap();
             assert_valid(&specialized, &what);
             let module = rspirv::dr::load_words(&specialized).unwrap();
-            let is_open =
-                |i: &&Instruction| matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse);
+            let is_open = |i: &&Instruction| {
+                matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse)
+            };
             assert_eq!(module.all_inst_iter().filter(is_open).count(), 0, "{what}");
             // there is nothing left to do
             let again = specialize(bytemuck::cast_slice(&specialized), &[], false).unwrap();

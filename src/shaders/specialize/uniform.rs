@@ -129,9 +129,16 @@ impl Moves {
     }
 
     /// Whether an instruction moves, and if so whether its result depends on push constants alone.
-    fn place(&self, i: &Instruction, facts: &Facts, types: &HashMap<u32, u32>, examined: &HashSet<u32>) -> Option<bool> {
+    fn place(
+        &self,
+        i: &Instruction,
+        facts: &Facts,
+        types: &HashMap<u32, u32>,
+        examined: &HashSet<u32>,
+    ) -> Option<bool> {
         let is_from_push = |id: &u32| self.from_push.contains_key(id);
-        let is_known = |o: &Operand| o.id_ref_any().is_none_or(|id| is_from_push(&id) || facts.numbers.contains_key(&id));
+        let is_known =
+            |o: &Operand| o.id_ref_any().is_none_or(|id| is_from_push(&id) || facts.numbers.contains_key(&id));
         let class = |id: &u32| types.get(id).and_then(|ty| facts.pointers.get(ty)).map(|p| p.0);
         match (i.class.opcode, &i.operands[..]) {
             (Op::AccessChain | Op::InBoundsAccessChain, [Operand::IdRef(base), indices @ ..]) => {
@@ -145,24 +152,31 @@ impl Moves {
                 }
             }
             (Op::Load, [Operand::IdRef(pointer), rest @ ..]) => {
-                let is_plain =
-                    rest.iter().all(|o| matches!(o, Operand::MemoryAccess(MemoryAccess::ALIGNED) | Operand::LiteralBit32(_)));
+                let is_plain = rest
+                    .iter()
+                    .all(|o| matches!(o, Operand::MemoryAccess(MemoryAccess::ALIGNED) | Operand::LiteralBit32(_)));
                 (is_plain && is_from_push(pointer)).then(|| class(pointer) == Some(StorageClass::PushConstant))
             }
             (Op::Bitcast | Op::ConvertUToPtr, [Operand::IdRef(address)]) => {
                 (is_from_push(address) && !examined.contains(address)).then_some(true)
             }
-            (Op::CompositeExtract, [Operand::IdRef(from), ..]) => self.same.contains_key(from).then(|| is_from_push(from)),
+            (Op::CompositeExtract, [Operand::IdRef(from), ..]) => {
+                self.same.contains_key(from).then(|| is_from_push(from))
+            }
             // the address of what lies behind something
-            (Op::IAdd | Op::IAddCarry | Op::CompositeConstruct, operands) => operands.iter().all(is_known).then_some(true),
+            (Op::IAdd | Op::IAddCarry | Op::CompositeConstruct, operands) => {
+                operands.iter().all(is_known).then_some(true)
+            }
             _ => None,
         }
     }
 
     /// Addresses with which the shader does other things than reading through them.
     fn examined(&self, blocks: &[Block]) -> HashSet<u32> {
-        let stay =
-            blocks.iter().flat_map(|b| &b.instructions).filter(|i| !i.result_id.is_some_and(|id| self.same.contains_key(&id)));
+        let stay = blocks
+            .iter()
+            .flat_map(|b| &b.instructions)
+            .filter(|i| !i.result_id.is_some_and(|id| self.same.contains_key(&id)));
         let used = stay.flat_map(|i| i.operands.iter().filter_map(Operand::id_ref_any));
         let mut waiting: Vec<u32> = used.filter_map(|id| self.same.get(&id).copied()).collect();
         let mut examined = HashSet::new();

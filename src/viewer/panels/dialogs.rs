@@ -46,9 +46,11 @@ pub fn show(app: &mut App, context: &Context) {
         (app.dialog, app.shows_help) = (None, false);
     }
     let mut open = app.shows_help;
-    egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(
-        context,
-        |ui| {
+    egui::Window::new("Keys and mouse")
+        .open(&mut open)
+        .collapsible(false)
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .show(context, |ui| {
             // with large text the window is low
             let height = (context.content_rect().height() - 80.0).clamp(100.0, 500.0);
             egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
@@ -60,8 +62,7 @@ pub fn show(app: &mut App, context: &Context) {
                     }
                 });
             });
-        },
-    );
+        });
     app.shows_help = open;
     if let Some(Poll::Ready(chosen)) = app.browsing.as_ref().map(Browsing::poll) {
         app.browsing = None;
@@ -87,7 +88,9 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         Dialog::Save(_) => ("Save the image", "A file: .png, .jpg or .webp as shown, .exr with all channels", "Save"),
         Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
-        Dialog::Render(..) => ("Render this view", "A file: .png, .exr, .jpg, .webp, .apng or frames.####.png", "Render"),
+        Dialog::Render(..) => {
+            ("Render this view", "A file: .png, .exr, .jpg, .webp, .apng or frames.####.png", "Render")
+        }
     };
 
     // its window: a path, and the action as a button
@@ -99,7 +102,8 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui: &mut Ui| {
             let heading = ui.label(label);
-            let edit = ui.add(egui::TextEdit::singleline(dialog.text_mut()).desired_width(420.0)).labelled_by(heading.id);
+            let edit =
+                ui.add(egui::TextEdit::singleline(dialog.text_mut()).desired_width(420.0)).labelled_by(heading.id);
             if !edit.has_focus() && !edit.lost_focus() && ui.memory(|m| m.focused().is_none()) {
                 edit.request_focus();
             }
@@ -143,8 +147,12 @@ fn act(app: &mut App, dialog: Dialog) {
     match dialog {
         Dialog::Open(text) if text.trim().is_empty() => {}
         Dialog::Open(text) => app.open_file(text.trim()),
-        Dialog::Save(text) if app.shows_second && app.second == Second::HeatMap => save_heat_map(app, Path::new(text.trim())),
-        Dialog::Save(text) => app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) }),
+        Dialog::Save(text) if app.shows_second && app.second == Second::HeatMap => {
+            save_heat_map(app, Path::new(text.trim()))
+        }
+        Dialog::Save(text) => {
+            app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) })
+        }
         Dialog::Render(text, motion) => app.render(text.trim(), motion),
         Dialog::LoadSettings(text) => match app.load_settings(Path::new(text.trim())) {
             Ok(()) => app.report(format!("loaded {}", text.trim()), false),

@@ -19,7 +19,11 @@ pub fn show(app: &mut App, ui: &mut Ui) {
     section(ui, "Real-time frames", false, |ui| frames(app, ui));
     section(ui, "Paths", false, |ui| paths(app, ui));
     section(ui, "Picture", false, |ui| {
-        editor::edit(ui, app.settings.picture.editable(), &serde_json::json!({ "tone_map": "linear", "exposure": 0.0 }));
+        editor::edit(
+            ui,
+            app.settings.picture.editable(),
+            &serde_json::json!({ "tone_map": "linear", "exposure": 0.0 }),
+        );
     });
     section(ui, "Scene file", false, |ui| {
         editor::edit(ui, app.settings.scene.editable(), &serde_json::json!({ "mtl_dissolve": "alpha" }));
@@ -240,7 +244,10 @@ fn truth(app: &mut App, ui: &mut Ui) {
     if matches!(app.first, Technique::Buffer(_)) {
         ui.label("The first image is a buffer: the ambient occlusion behind it is compared.");
     } else if app.first.integrator() != app.truth().integrator() {
-        ui.label(format!("{} is not what the first image approximates: the difference is not its error.", app.truth().label()));
+        ui.label(format!(
+            "{} is not what the first image approximates: the difference is not its error.",
+            app.truth().label()
+        ));
     }
 }
 
@@ -261,14 +268,17 @@ fn frames(app: &mut App, ui: &mut Ui) {
         values["filter"] = values["filter"]["kind"].take();
         values
     });
-    const HIDDEN: [&str; 9] = ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "technique", "show"];
+    const HIDDEN: [&str; 9] =
+        ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "technique", "show"];
     let all = applicable(app.settings.frames.editable(), &crate::integrators::ao::AmbientOcclusion, &HIDDEN);
     editor::edit(ui, all, &effective.unwrap_or_default());
 }
 
 fn paths(app: &mut App, ui: &mut Ui) {
     let integrator = match app.first {
-        Technique::Still(integrator) | Technique::Frames(integrator) if !integrator.can(Capability::AmbientVisibility) => {
+        Technique::Still(integrator) | Technique::Frames(integrator)
+            if !integrator.can(Capability::AmbientVisibility) =>
+        {
             integrator.get()
         }
         _ => {
@@ -306,7 +316,11 @@ fn light(app: &mut App, ui: &mut Ui) {
     }
     ui.data_mut(|d| d.insert_temp(id, (current, text)));
     ui.add_enabled_ui(app.lighting.environment.is_some(), |ui| {
-        editor::edit(ui, app.lighting.editable(), &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }));
+        editor::edit(
+            ui,
+            app.lighting.editable(),
+            &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }),
+        );
     });
     ui.separator();
 
@@ -315,7 +329,8 @@ fn light(app: &mut App, ui: &mut Ui) {
         .label("Add a light")
         .on_hover_text(format!("As --light takes it: {}, then key=value", crate::scene::light_spec::kinds()));
     let id = ui.make_persistent_id("light text");
-    let mut text = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| "sun direction=-1,-2,-1 irradiance=3".into());
+    let mut text =
+        ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| "sun direction=-1,-2,-1 irradiance=3".into());
     ui.horizontal(|ui| {
         ui.add(egui::TextEdit::singleline(&mut text).desired_width(200.0)).labelled_by(heading.id);
         if ui.button("Add").clicked() {
@@ -345,7 +360,10 @@ fn light(app: &mut App, ui: &mut Ui) {
 fn camera(app: &mut App, ui: &mut Ui) {
     let Some(shown) = app.shown_camera() else { return };
     let to_world = shown.camera_to_world;
-    ui.label(format!("Eye {:.3}, {:.3}, {:.3}", to_world.translation.x, to_world.translation.y, to_world.translation.z));
+    ui.label(format!(
+        "Eye {:.3}, {:.3}, {:.3}",
+        to_world.translation.x, to_world.translation.y, to_world.translation.z
+    ));
     if let crate::scene::Projection::Perspective { fov_y } = shown.projection {
         let mut degrees = fov_y.to_degrees();
         ui.horizontal(|ui| {
@@ -367,7 +385,11 @@ fn camera(app: &mut App, ui: &mut Ui) {
         let heading = ui.label("Turntable");
         ui.add(Slider::new(&mut app.turntable, -2.0..=2.0).suffix(" rad/s")).labelled_by(heading.id);
     });
-    if ui.button("Copy the camera").on_hover_text("Copies the options of skylit render that choose this camera").clicked() {
+    if ui
+        .button("Copy the camera")
+        .on_hover_text("Copies the options of skylit render that choose this camera")
+        .clicked()
+    {
         match app.render_settings(RenderedMotion::Nothing) {
             Ok(shown) => {
                 let settings = crate::renderer::RenderSettings { camera: shown.camera, ..Default::default() };
@@ -427,7 +449,8 @@ fn device(app: &mut App, ui: &mut Ui) {
             let label = ui.label("Vulkan device");
             let chosen = app.device.index;
             let mut choice = chosen;
-            let combo = ComboBox::from_id_salt("device").selected_text(app.devices.get(chosen).map_or("", String::as_str));
+            let combo =
+                ComboBox::from_id_salt("device").selected_text(app.devices.get(chosen).map_or("", String::as_str));
             let combo = combo.show_ui(ui, |ui| {
                 for (k, name) in app.devices.iter().enumerate() {
                     ui.selectable_value(&mut choice, k, name);
@@ -485,9 +508,12 @@ fn selection(app: &App, ui: &mut Ui) {
         ui.label("Click into the image.");
         return;
     };
-    let name = |(index, name): &(usize, String)| if name.is_empty() { format!("{index}") } else { format!("{index} '{name}'") };
+    let name = |(index, name): &(usize, String)| {
+        if name.is_empty() { format!("{index}") } else { format!("{index} '{name}'") }
+    };
     let textures = app.scene.as_ref().map(|s| s.textures.as_slice()).unwrap_or_default();
-    let textures: Vec<_> = pick.textures.iter().filter_map(|&t| textures.get(t).map(|n| format!("{t} '{n}'"))).collect();
+    let textures: Vec<_> =
+        pick.textures.iter().filter_map(|&t| textures.get(t).map(|n| format!("{t} '{n}'"))).collect();
     // names may be long: they are broken, and do not make the panel wider
     let width = (ui.available_width() - 90.0).max(60.0);
     egui::Grid::new("selection").num_columns(2).striped(true).max_col_width(width).show(ui, |ui| {

@@ -29,8 +29,13 @@ pub fn show(app: &mut App, ui: &mut Ui) {
             ui.separator();
         }
         if let Some(comparison) = &app.comparison {
-            ui.label(format!("RMSE {:.4}, FLIP {:.4} against {}", comparison.rmse, comparison.flip, app.truth().label()))
-                .on_hover_text("Error against the truth");
+            ui.label(format!(
+                "RMSE {:.4}, FLIP {:.4} against {}",
+                comparison.rmse,
+                comparison.flip,
+                app.truth().label()
+            ))
+            .on_hover_text("Error against the truth");
             ui.separator();
         }
 

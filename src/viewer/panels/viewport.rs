@@ -1,8 +1,8 @@
 //! The images, and the mouse and keys that move the camera.
 
 use egui::{
-    Align2, Color32, Context, CornerRadius, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Rect, Sense, Stroke, Ui,
-    Vec2,
+    Align2, Color32, Context, CornerRadius, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Rect, Sense,
+    Stroke, Ui, Vec2,
 };
 
 use super::menu::{self, shortcuts};
@@ -100,7 +100,8 @@ fn fly(app: &mut App, context: &Context, is_free: bool) {
     let (held, turned, seconds, faster) = context.input(|i| {
         let axis = |up: Key, down: Key| f64::from(i8::from(i.key_down(up)) - i8::from(i.key_down(down)));
         let free = !i.modifiers.command && !i.modifiers.alt;
-        let held = [axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S)].map(|a| if free { a } else { 0.0 });
+        let held =
+            [axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S)].map(|a| if free { a } else { 0.0 });
         let turned = [axis(Key::ArrowRight, Key::ArrowLeft), axis(Key::ArrowUp, Key::ArrowDown)];
         (held, turned, f64::from(i.stable_dt.min(0.1)), i.modifiers.shift)
     });
@@ -158,7 +159,8 @@ pub fn show(app: &mut App, ui: &mut Ui) {
 fn divider(app: &mut App, ui: &mut Ui, rect: Rect, share: f32) -> f32 {
     let x = rect.left() + share * rect.width();
     let handle = Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(HANDLE, rect.height()));
-    let response = ui.interact(handle, ui.id().with("divider"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
+    let response =
+        ui.interact(handle, ui.id().with("divider"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Other, true, "Line between the images"));
     let mut share = share;
     if let (true, Some(pointer)) = (response.dragged(), response.interact_pointer_pos()) {
@@ -190,7 +192,9 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
     let Some(control) = &mut app.control else { return };
     if delta != Vec2::ZERO {
         match () {
-            () if response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary) => {
+            () if response.dragged_by(PointerButton::Middle)
+                || shift && response.dragged_by(PointerButton::Primary) =>
+            {
                 control.pan(dx, dy, f64::from(response.rect.height()));
             }
             () if response.dragged_by(PointerButton::Secondary) => control.look(dx, dy),
@@ -262,7 +266,10 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
         lines.push(("rendering …".into(), false));
     }
     if app.source.is_none() {
-        lines.push(("Open a scene (Ctrl+O), drop a file here, or choose a built-in one in the menu File.".into(), false));
+        lines.push((
+            "Open a scene (Ctrl+O), drop a file here, or choose a built-in one in the menu File.".into(),
+            false,
+        ));
     }
     lines.extend(app.failure.iter().map(|t| (t.clone(), true)));
     lines.extend(app.error(app.shows_second).map(|t| (t.clone(), true)));
@@ -281,9 +288,10 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
     // a box at the bottom, which may offer a remedy
     let width = (rect.width() - 40.0).clamp(120.0, 620.0);
     let (mut dialog_opened, mut cancelled) = (false, false);
-    egui::Area::new("notices".into()).pivot(Align2::CENTER_BOTTOM).fixed_pos(rect.center_bottom() - Vec2::new(0.0, 30.0)).show(
-        ui.ctx(),
-        |ui| {
+    egui::Area::new("notices".into())
+        .pivot(Align2::CENTER_BOTTOM)
+        .fixed_pos(rect.center_bottom() - Vec2::new(0.0, 30.0))
+        .show(ui.ctx(), |ui| {
             egui::Frame::popup(ui.style()).show(ui, |ui| {
                 ui.set_max_width(width);
                 for (text, is_error) in lines {
@@ -305,8 +313,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
                     dialog_opened = ui.button("Open…").clicked();
                 }
             });
-        },
-    );
+        });
 
     if cancelled {
         app.cancel_loading();

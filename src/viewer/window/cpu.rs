@@ -34,7 +34,13 @@ fn surface(window: Arc<Window>) -> Result<Surface<Arc<Window>, Arc<Window>>> {
 }
 
 impl Presenter for CpuPresenter {
-    fn present(&mut self, size: [u32; 2], layers: &[Layer], context: &egui::Context, painted: &mut Painted) -> Result<()> {
+    fn present(
+        &mut self,
+        size: [u32; 2],
+        layers: &[Layer],
+        context: &egui::Context,
+        painted: &mut Painted,
+    ) -> Result<()> {
         let [Some(width), Some(height)] = size.map(NonZeroU32::new) else { return Ok(()) };
         self.surface.resize(width, height).map_err(failed)?;
         let mut buffer = self.surface.buffer_mut().map_err(failed)?;

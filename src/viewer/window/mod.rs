@@ -31,7 +31,13 @@ trait Presenter {
     ///
     /// # Errors
     /// Those of the window system, after which [`Presenter::recover`] is called.
-    fn present(&mut self, size: [u32; 2], layers: &[Layer], context: &egui::Context, painted: &mut Painted) -> Result<()>;
+    fn present(
+        &mut self,
+        size: [u32; 2],
+        layers: &[Layer],
+        context: &egui::Context,
+        painted: &mut Painted,
+    ) -> Result<()>;
 
     /// Creates the window's surface anew, after an error.
     ///
@@ -95,7 +101,8 @@ pub fn run(options: &ViewOptions) -> Result<()> {
     }
     let app = App::new(options, mailbox, events);
     let options = options.clone();
-    let mut viewer = Viewer { app, context, proxy, options, open: None, redraw: None, failed: None, presenter_failures: 0 };
+    let mut viewer =
+        Viewer { app, context, proxy, options, open: None, redraw: None, failed: None, presenter_failures: 0 };
     let outcome = event_loop.run_app(&mut viewer).map_err(|e| no_display(&e));
     viewer.app.quit();
     // a panic of it was an event, which the window has shown
@@ -131,12 +138,19 @@ impl Viewer {
             .with_min_inner_size(LogicalSize::new(MIN_SIZE[0], MIN_SIZE[1]))
             // AccessKit wants to be there before it is seen
             .with_visible(false);
-        let window =
-            event_loop.create_window(attributes).map_err(|e| Error::Device(format!("the window cannot be opened: {e}")))?;
+        let window = event_loop
+            .create_window(attributes)
+            .map_err(|e| Error::Device(format!("the window cannot be opened: {e}")))?;
         let window = Arc::new(window);
         let scale = window.scale_factor() as f32;
-        let mut input =
-            egui_winit::State::new(self.context.clone(), egui::ViewportId::ROOT, &window, Some(scale), window.theme(), None);
+        let mut input = egui_winit::State::new(
+            self.context.clone(),
+            egui::ViewportId::ROOT,
+            &window,
+            Some(scale),
+            window.theme(),
+            None,
+        );
         input.init_accesskit(event_loop, &window, self.proxy.clone());
         let presenter: Box<dyn Presenter> = match self.options.painter {
             Painter::Cpu => Box::new(cpu::CpuPresenter::new(window.clone())?),

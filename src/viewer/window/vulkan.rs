@@ -87,14 +87,22 @@ impl VulkanPresenter {
         }
 
         // textures of images that are gone
-        textures.free.extend((images.len()..self.images.len()).map(|slot| TextureId::Managed(FIRST_IMAGE + slot as u64)));
+        textures
+            .free
+            .extend((images.len()..self.images.len()).map(|slot| TextureId::Managed(FIRST_IMAGE + slot as u64)));
         self.images = images;
         primitives
     }
 }
 
 impl Presenter for VulkanPresenter {
-    fn present(&mut self, size: [u32; 2], layers: &[Layer], context: &egui::Context, painted: &mut Painted) -> Result<()> {
+    fn present(
+        &mut self,
+        size: [u32; 2],
+        layers: &[Layer],
+        context: &egui::Context,
+        painted: &mut Painted,
+    ) -> Result<()> {
         let shapes = std::mem::take(&mut painted.shapes);
         let mut textures = std::mem::take(&mut painted.textures);
         let mut primitives = self.layers(layers, painted.pixels_per_point, &mut textures);

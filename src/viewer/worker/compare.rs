@@ -54,7 +54,13 @@ mod tests {
 
     fn values(channels: usize, values: Vec<f32>, variance: f32) -> ViewValues {
         let n = values.len();
-        ViewValues { size: [2, 2], channels, values, coverage: vec![1.0, 1.0, 1.0, 0.0], variance: Some(vec![variance; n]) }
+        ViewValues {
+            size: [2, 2],
+            channels,
+            values,
+            coverage: vec![1.0, 1.0, 1.0, 0.0],
+            variance: Some(vec![variance; n]),
+        }
     }
 
     #[test]

@@ -37,7 +37,12 @@ impl Loader {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] when there can be no further thread.
-    pub fn start(source: &str, confine: Confine<'static>, mailbox: &Arc<Mailbox>, events: &EventSender) -> Result<Self> {
+    pub fn start(
+        source: &str,
+        confine: Confine<'static>,
+        mailbox: &Arc<Mailbox>,
+        events: &EventSender,
+    ) -> Result<Self> {
         let (sender, parts) = sync_channel(2);
         let [is_ready, is_cancelled] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let job = Job {

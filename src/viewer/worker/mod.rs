@@ -13,7 +13,9 @@ use std::time::{Duration, Instant};
 use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
 
-use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, TRUTH, Task};
+use super::request::{
+    Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, TRUTH, Task,
+};
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::gpu::{self, Device};
@@ -174,7 +176,8 @@ impl Worker {
         };
         let mut geometry: Option<(Instant, Scene)> = None;
         loop {
-            if self.mailbox.is(|r| r.load != request.load || r.scene != request.scene || r.quits) || loader.has_ended() {
+            if self.mailbox.is(|r| r.load != request.load || r.scene != request.scene || r.quits) || loader.has_ended()
+            {
                 return Err(Error::Interrupted);
             }
             match loader.next(Duration::from_millis(10)).transpose()? {
@@ -191,7 +194,8 @@ impl Worker {
 
     /// Puts the scene with its images in place of its geometry alone, if they have been loaded.
     fn take_images(&mut self, source: &str) -> Result<()> {
-        let Some(OpenScene { renderer, load, device, loader: Some(mut loader) }) = self.open.take_if(|o| o.loader.is_some())
+        let Some(OpenScene { renderer, load, device, loader: Some(mut loader) }) =
+            self.open.take_if(|o| o.loader.is_some())
         else {
             return Ok(());
         };
@@ -226,14 +230,16 @@ impl Worker {
     fn list_devices(&mut self) {
         if !std::mem::replace(&mut self.listed_devices, true) {
             let devices = gpu::Instance::new(false).and_then(|instance| gpu::enumerate(&instance)).unwrap_or_default();
-            self.events.send(Event::Devices(devices.into_iter().map(|d| format!("{} ({})", d.name, d.driver)).collect()));
+            self.events
+                .send(Event::Devices(devices.into_iter().map(|d| format!("{} ({})", d.name, d.driver)).collect()));
         }
     }
 
     /// Changes the tracer, or the device. Settings that the device does not support leave both as
     /// they were.
     fn set_device(&mut self, settings: &DeviceSettings) -> Result<()> {
-        let Some(OpenScene { renderer, load, device: before, loader }) = self.open.take_if(|o| o.device != *settings) else {
+        let Some(OpenScene { renderer, load, device: before, loader }) = self.open.take_if(|o| o.device != *settings)
+        else {
             return Ok(());
         };
         let device = renderer.device().clone();
@@ -291,7 +297,8 @@ impl Worker {
             }
             Err(e @ (Error::Usage(_) | Error::Input { .. })) => {
                 let lights = [first.lighting.clone(), self.lighting.clone()];
-                events.send(Event::LightingRefused(Box::new(lights), crate::terminal::console::one_line(&e.to_string())));
+                events
+                    .send(Event::LightingRefused(Box::new(lights), crate::terminal::console::one_line(&e.to_string())));
                 refused = Some(std::mem::replace(&mut first.lighting, self.lighting.clone()));
                 open.renderer.interactive(&first.lighting, animation)?
             }
@@ -442,7 +449,15 @@ impl ViewerSession<'_> {
         }
     }
 
-    fn step(&mut self, k: usize, request: &Request, number: u64, changed: Instant, camera: &Camera, moves: bool) -> Result<()> {
+    fn step(
+        &mut self,
+        k: usize,
+        request: &Request,
+        number: u64,
+        changed: Instant,
+        camera: &Camera,
+        moves: bool,
+    ) -> Result<()> {
         // one step, which a change of the request ends early
         let frame_time = request.frame_rate.map(|rate| Duration::from_secs_f64(SHARE / rate.max(0.1)));
         let mut control = StopOnChange { mailbox: self.mailbox, request, moves };
@@ -476,7 +491,8 @@ impl ViewerSession<'_> {
             Err(e @ (Error::DeviceLost(_) | Error::OutOfMemory(_))) => return Err(e),
             Err(e) => {
                 pane.fail();
-                self.events.send(Event::PaneError(request.pane(k), Some(crate::terminal::console::one_line(&e.to_string()))));
+                self.events
+                    .send(Event::PaneError(request.pane(k), Some(crate::terminal::console::one_line(&e.to_string()))));
             }
         }
 
@@ -512,7 +528,8 @@ impl ViewerSession<'_> {
         let (aspect, scene) = (request.aspect(), self.interactive.scene());
         let automatic = self.interactive.automatic_camera(aspect, &mut NoControl)?;
         let framed = scene.bounds().map(|(lo, hi)| Camera::framing(lo, hi, aspect));
-        let cameras = [camera.clone(), automatic].into_iter().chain(scene.cameras.first().cloned()).chain(framed).collect();
+        let cameras =
+            [camera.clone(), automatic].into_iter().chain(scene.cameras.first().cloned()).chain(framed).collect();
         let visible = black::first_visible(&mut self.interactive, settings, aspect, cameras, frames, &mut NoControl)?;
         if let Some(visible) = visible.filter(|visible| visible != camera) {
             self.events.send(Event::Framed(Box::new([camera.clone(), visible])));
@@ -606,7 +623,9 @@ impl ViewerSession<'_> {
         if !request.compares || self.panes.len() < 2 || self.last_motion.elapsed() < REST {
             return Ok(());
         }
-        let (Some(image), Some(truth)) = (self.panes[0].rest(), self.panes[self.panes.len() - 1].rest()) else { return Ok(()) };
+        let (Some(image), Some(truth)) = (self.panes[0].rest(), self.panes[self.panes.len() - 1].rest()) else {
+            return Ok(());
+        };
         let steps = self.panes[0].steps() + self.panes[self.panes.len() - 1].steps();
         let is_due = match self.compared {
             None => true,
@@ -636,8 +655,9 @@ impl Control for StopOnChange<'_> {
     fn should_stop(&mut self) -> Result<bool> {
         let target = |r: &Request| (r.load, r.size, r.quits);
         let moved = |r: &Request| r.camera != self.request.camera || r.time != self.request.time;
-        let other =
-            |r: &Request| target(r) != target(self.request) || r.device != self.request.device || r.panes != self.request.panes;
+        let other = |r: &Request| {
+            target(r) != target(self.request) || r.device != self.request.device || r.panes != self.request.panes
+        };
         let is_useless = self.mailbox.is(|r| other(r) || !self.moves && moved(r));
         if is_useless { Err(Error::Interrupted) } else { Ok(false) }
     }

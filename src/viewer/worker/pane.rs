@@ -168,7 +168,9 @@ impl Pane {
             Some(view) => view,
             None => match View::new(session, &self.settings, size, control) {
                 // without the one before
-                Err(Error::OutOfMemory(_)) if before.take().is_some() => View::new(session, &self.settings, size, control)?,
+                Err(Error::OutOfMemory(_)) if before.take().is_some() => {
+                    View::new(session, &self.settings, size, control)?
+                }
                 made => made?,
             },
         };
@@ -237,7 +239,8 @@ impl Pane {
             }
             let expected = if finer.is_empty() { now * pixels(scale - 1) / pixels(scale) } else { least(finer) };
             // what was not measured yet is expected to be slower than it is
-            if expected <= HEADROOM * most || finer.is_empty() && now <= 0.6 * most && self.frames_at_scale >= REMEMBERED as u32
+            if expected <= HEADROOM * most
+                || finer.is_empty() && now <= 0.6 * most && self.frames_at_scale >= REMEMBERED as u32
             {
                 self.scale = scale - 1;
             }

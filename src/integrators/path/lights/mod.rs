@@ -67,7 +67,8 @@ pub(super) struct Lights {
 impl Lights {
     /// No lights but the environment.
     pub fn environment_only() -> Self {
-        let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
+        let record =
+            LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
         let tree = vec![light_tree::no_lights()];
         Self { records: vec![record], starts: vec![0; 3], tree, environment: Some(0), ..Default::default() }
     }
@@ -98,7 +99,8 @@ impl LightBuilder {
     /// sphere.
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
         let scene = flat.scene;
-        let moves = |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
+        let moves =
+            |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
         let moves: Vec<bool> = scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect();
         Self {
             origin: flat.origin,

@@ -101,8 +101,11 @@ impl<'s> Picture<'s> {
     /// of the mean radiance of all triangles.
     fn parts(&self, triangle: usize, side: u32, whole: f64) -> Vec<Part> {
         let coordinates = self.mesh.texcoords.get(self.slot.texcoord).filter(|c| !c.is_empty());
-        let Some(coordinates) = coordinates.filter(|_| side > 1 && !self.texture.texels.is_empty()) else { return Vec::new() };
-        let [a, b, c] = self.mesh.indices[triangle].map(|k| self.slot.transform.transform_point2(coordinates[k as usize]));
+        let Some(coordinates) = coordinates.filter(|_| side > 1 && !self.texture.texels.is_empty()) else {
+            return Vec::new();
+        };
+        let [a, b, c] =
+            self.mesh.indices[triangle].map(|k| self.slot.transform.transform_point2(coordinates[k as usize]));
         let mut parts: Vec<Part> = grid(side).collect();
         for part in &mut parts {
             let mut sum = Vec3::ZERO;
@@ -191,7 +194,9 @@ mod tests {
         // the cell of that texel: its two parts, in the second row
         assert_eq!(bright, [7, 8]);
         let mean = 3.0 / 8.0;
-        assert!(parts.iter().enumerate().all(|(k, p)| bright.contains(&k) || (p.brightness - LEAST * mean).abs() < 1e-9));
+        assert!(
+            parts.iter().enumerate().all(|(k, p)| bright.contains(&k) || (p.brightness - LEAST * mean).abs() < 1e-9)
+        );
         assert!(of(&white).parts(0, 4, 1.0).is_empty() && of(&dark).parts(0, 1, 1.0).is_empty());
     }
 }

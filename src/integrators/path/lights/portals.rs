@@ -19,7 +19,8 @@ pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, 
     let portals: Vec<_> = scene.portals.iter().filter(|p| p.area() > 0.0).collect();
     let through = |area: f64| PI * area * brightness;
     let of_portals: f64 = portals.iter().map(|p| through(p.area())).sum();
-    let own = if portals.is_empty() { PI * brightness } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
+    let own =
+        if portals.is_empty() { PI * brightness } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
     let record = LightRecord {
         kind: Kind::Environment as u32,
         instance: INVALID,

@@ -39,7 +39,8 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
             ..Default::default()
         };
         let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(scene, texture));
-        let of_textures = brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let of_textures =
+            brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
         let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
         let alpha_factor = if is_tested {
             mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w)
@@ -66,8 +67,15 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                 // none, one, or many lights of a triangle: in proportion to its own brightness, and
                 // alpha for all alike
                 let parts = |k: usize| pictured.map_or(&[][..], |parts| &parts[k]);
-                let lights =
-                    add_triangles(all, t, point, plain, (brightness, alpha_factor), parts, LightRecord { flags, ..base });
+                let lights = add_triangles(
+                    all,
+                    t,
+                    point,
+                    plain,
+                    (brightness, alpha_factor),
+                    parts,
+                    LightRecord { flags, ..base },
+                );
                 of_primitives.extend(lights);
             }
             Geometry::Spheres(spheres) => {
@@ -129,35 +137,36 @@ fn add_triangles<'p>(
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
 
     // a light with its bounds
-    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, part: (u32, f64), brightness: f64| {
-        let (flags, share) = part;
-        let normal = turn * e1.cross(e2);
-        let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
-        let (b, c) = (a + e1, a + e2);
-        let far = if kind == Kind::Rectangle { a + e1 + e2 } else { a };
-        let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
-        // barycentric coordinates follow the vertices; a reversed winding reverses the normal
-        let record = LightRecord {
-            kind: kind as u32,
-            position: a.as_vec3().to_array(),
-            axis: e1.as_vec3().to_array(),
-            edge: e2.as_vec3().to_array(),
-            primitive: primitive as u32,
-            lift: (extent * ROUNDING_BOUND + slack) as f32,
-            flags: base.flags | flags,
-            ..base
+    let mut push =
+        |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64, part: (u32, f64), brightness: f64| {
+            let (flags, share) = part;
+            let normal = turn * e1.cross(e2);
+            let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
+            let (b, c) = (a + e1, a + e2);
+            let far = if kind == Kind::Rectangle { a + e1 + e2 } else { a };
+            let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
+            // barycentric coordinates follow the vertices; a reversed winding reverses the normal
+            let record = LightRecord {
+                kind: kind as u32,
+                position: a.as_vec3().to_array(),
+                axis: e1.as_vec3().to_array(),
+                edge: e2.as_vec3().to_array(),
+                primitive: primitive as u32,
+                lift: (extent * ROUNDING_BOUND + slack) as f32,
+                flags: base.flags | flags,
+                ..base
+            };
+            let bounds = Bounds {
+                lo: a.min(b).min(c).min(far),
+                hi: a.max(b).max(c).max(far),
+                axis: normal.normalize_or(DVec3::Z),
+                spread: 0.0,
+                falloff: 0.5 * PI,
+                two_sided,
+                intensity: area * brightness,
+            };
+            all.push_part(record, bounds, share)
         };
-        let bounds = Bounds {
-            lo: a.min(b).min(c).min(far),
-            hi: a.max(b).max(c).max(far),
-            axis: normal.normalize_or(DVec3::Z),
-            spread: 0.0,
-            falloff: 0.5 * PI,
-            two_sided,
-            intensity: area * brightness,
-        };
-        all.push_part(record, bounds, share)
-    };
 
     // two triangles, a triangle, or its parts at a time
     let whole = (0, 1.0);
@@ -177,7 +186,14 @@ fn add_triangles<'p>(
         let mut part = |part: &Part| {
             let corner = a + part.corner.x * e1 + part.corner.y * e2;
             let triangle = [corner, part.scale * e1, part.scale * e2];
-            push(Kind::Triangle, triangle, k, 0.0, (part.flags, part.brightness / all_parts), part.brightness * alpha_factor)
+            push(
+                Kind::Triangle,
+                triangle,
+                k,
+                0.0,
+                (part.flags, part.brightness / all_parts),
+                part.brightness * alpha_factor,
+            )
         };
         // they follow one another: shaders count from the first
         let indices: Vec<u32> = parts(k).iter().map(&mut part).collect();
@@ -216,7 +232,9 @@ fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)>
 /// Mean alpha of an emitter with transparency, as a factor of its power; an estimate suffices.
 fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 {
     let of_vertices = match geometry {
-        Geometry::Triangles(t) if !t.colors.is_empty() => t.colors.iter().map(|c| c.w).sum::<f32>() / t.colors.len() as f32,
+        Geometry::Triangles(t) if !t.colors.is_empty() => {
+            t.colors.iter().map(|c| c.w).sum::<f32>() / t.colors.len() as f32
+        }
         _ => 1.0,
     };
     let mean = material.base_color.w * of_texture * of_vertices;

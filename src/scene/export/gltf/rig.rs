@@ -7,7 +7,9 @@ use glam::DMat4;
 use serde_json::{Value, json};
 
 use super::{Writer, node, with_mesh};
-use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, LocalTransform, Property, Sampler, Skin};
+use crate::scene::animation::{
+    Animation, Channel, Deformation, Interpolation, LocalTransform, Property, Sampler, Skin,
+};
 use crate::scene::{AnimationRig, Scene};
 
 /// The node hierarchy that is being written.
@@ -123,7 +125,8 @@ impl Writer {
                 if small { joints.map(|&j| j as u8).collect() } else { joints.flat_map(|j| j.to_le_bytes()).collect() };
             let view = self.view(&bytes, Some(34962));
             let component = if small { 5121 } else { 5123 };
-            self.accessors.push(json!({ "bufferView": view, "componentType": component, "count": vertices, "type": "VEC4" }));
+            self.accessors
+                .push(json!({ "bufferView": view, "componentType": component, "count": vertices, "type": "VEC4" }));
             primitive["attributes"][format!("JOINTS_{set}")] = json!(self.accessors.len() - 1);
             let weights = self.floats(influences.weights.iter().copied(), false);
             primitive["attributes"][format!("WEIGHTS_{set}")] = json!(weights);
@@ -139,7 +142,8 @@ impl Writer {
             if target.positions.is_empty() && target.normals.is_empty() {
                 // without data it is zero; a target must have something
                 let zero = [0.0; 3];
-                let accessor = json!({ "componentType": 5126, "count": vertices, "type": "VEC3", "min": zero, "max": zero });
+                let accessor =
+                    json!({ "componentType": 5126, "count": vertices, "type": "VEC3", "min": zero, "max": zero });
                 self.accessors.push(accessor);
                 attributes["POSITION"] = json!(self.accessors.len() - 1);
             }
@@ -201,7 +205,9 @@ impl Writer {
         };
         let values = &sampler.values;
         let output = match channel.property {
-            Property::Translation | Property::Scale => self.numbers(values.as_chunks::<3>().0.iter().copied(), false, None),
+            Property::Translation | Property::Scale => {
+                self.numbers(values.as_chunks::<3>().0.iter().copied(), false, None)
+            }
             Property::Rotation => self.numbers(values.as_chunks::<4>().0.iter().copied(), false, None),
             Property::Weights => self.numbers(values.iter().map(|&w| [w]), false, None),
         };

@@ -80,7 +80,8 @@ impl Loader<'_> {
         let eye = s.vector("position")?.unwrap_or(DVec3::ZERO);
         let direction = s.vector("view_direction")?.unwrap_or(DVec3::NEG_Z);
         let fov = s.number("vertical_fov")?.unwrap_or(45.0);
-        let direction = direction.try_normalize().ok_or_else(|| format!("line {line}: Camera: view_direction[] is zero"))?;
+        let direction =
+            direction.try_normalize().ok_or_else(|| format!("line {line}: Camera: view_direction[] is zero"))?;
         if !(fov > 0.0 && fov < 180.0) {
             return Err(format!("line {line}: Camera: vertical_fov[{fov}]: between 0 and 180 degrees expected"));
         }
@@ -250,7 +251,8 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
         _ => Vec3::ONE,
     };
 
-    let specular_color = specular.or(reflectance).unwrap_or(if kind == MaterialKind::Matte { Vec3::ZERO } else { tint });
+    let specular_color =
+        specular.or(reflectance).unwrap_or(if kind == MaterialKind::Matte { Vec3::ZERO } else { tint });
     let glass = kind == MaterialKind::Glass;
     Ok(Some(Material {
         name: name.to_owned(),

@@ -49,7 +49,9 @@ fn statement(line: &str, number: usize) -> Result<Option<Statement<'_>>, String>
             return Err("values in brackets without a name".to_owned());
         }
         match (&mut statement, values) {
-            (None, own) => statement = Some(Statement { line: number, key: word, own, fields: Vec::new(), seen: Vec::new() }),
+            (None, own) => {
+                statement = Some(Statement { line: number, key: word, own, fields: Vec::new(), seen: Vec::new() })
+            }
             (Some(s), Some(values)) => s.fields.push((word, values)),
             (Some(_), None) => return Err(format!("`{word}` has no values in brackets")),
         }
@@ -115,7 +117,8 @@ impl<'a> Statement<'a> {
 
     /// The values right after the key as whole numbers above zero.
     pub(super) fn own_counts(&self) -> Result<Vec<u32>, String> {
-        let number = |w: &str| w.parse::<f64>().map_err(|_| format!("`{w}` is not a number")).and_then(|x| self.whole(x, 1));
+        let number =
+            |w: &str| w.parse::<f64>().map_err(|_| format!("`{w}` is not a number")).and_then(|x| self.whole(x, 1));
         self.own()?.split_whitespace().map(|w| number(w).map_err(|e| self.error(e))).collect()
     }
 

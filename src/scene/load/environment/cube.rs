@@ -29,7 +29,8 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Pixels> {
         ));
     }
     let (width, height) = ((4 * side).min(MAX_SIDE), (2 * side).min(MAX_SIDE / 2));
-    let radiance = (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(&faces, [width, height], k)).collect();
+    let radiance =
+        (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(&faces, [width, height], k)).collect();
     let warnings: Vec<String> = faces.into_iter().filter_map(|f| f.warning).collect();
     Ok(Pixels { width, height, radiance, warning: (!warnings.is_empty()).then(|| warnings.join("; ")) })
 }
@@ -38,7 +39,10 @@ fn face(folder: &Path, name: &str, budget: &Budget) -> Result<Pixels> {
     let candidates = EXTENSIONS.map(|e| folder.join(name).with_extension(e));
     let Some(path) = candidates.iter().find(|p| p.is_file()) else {
         let all = FACES.join(", ");
-        return Err(Error::input(folder, format!("has no face {name} (.hdr, .exr, .png, .jpg, .webp): a cube has {all}")));
+        return Err(Error::input(
+            folder,
+            format!("has no face {name} (.hdr, .exr, .png, .jpg, .webp): a cube has {all}"),
+        ));
     };
     super::read(path, budget)
 }
@@ -47,8 +51,9 @@ fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {
     let (x, y) = (k % width, k / width);
     let mut sum = Vec3::ZERO;
     for p in 0..POINTS * POINTS {
-        let at =
-            |pixel: u32, point: u32, n: u32| (f64::from(pixel) + (f64::from(point) + 0.5) / f64::from(POINTS)) / f64::from(n);
+        let at = |pixel: u32, point: u32, n: u32| {
+            (f64::from(pixel) + (f64::from(point) + 0.5) / f64::from(POINTS)) / f64::from(n)
+        };
         // from the upper left corner; -z is in the middle, +x to the right of it
         // (shaders/path/map.glsl)
         let (phi, theta) = (2.0 * PI * (at(x, p % POINTS, width) - 0.5), PI * at(y, p / POINTS, height));

@@ -143,12 +143,20 @@ impl<'a> Reader<'a> {
             Some(end) if end <= declared => {
                 Ok((&buffer[offset as usize..end as usize], view.byte_stride.map(|s| s.0).filter(|&s| s > 0)))
             }
-            _ => Err(format!("buffer view {index} lies outside of its buffer (bytes {offset} + {length} of {declared})")),
+            _ => {
+                Err(format!("buffer view {index} lies outside of its buffer (bytes {offset} + {length} of {declared})"))
+            }
         }
     }
 
     /// `count` elements of `size` bytes from `offset` on in a buffer view.
-    fn elements(&self, view: Index<buffer::View>, offset: u64, count: u64, size: usize) -> Result<Elements<'a>, String> {
+    fn elements(
+        &self,
+        view: Index<buffer::View>,
+        offset: u64,
+        count: u64,
+        size: usize,
+    ) -> Result<Elements<'a>, String> {
         let (bytes, stride) = self.view(view)?;
         let stride = stride.unwrap_or(size);
         if stride < size {
@@ -159,7 +167,9 @@ impl<'a> Reader<'a> {
         }
         let end = (count - 1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)?.checked_add(offset));
         match end {
-            Some(end) if end <= bytes.len() as u64 => Ok(Elements { bytes: &bytes[offset as usize..end as usize], stride }),
+            Some(end) if end <= bytes.len() as u64 => {
+                Ok(Elements { bytes: &bytes[offset as usize..end as usize], stride })
+            }
             _ => Err(format!("{count} elements lie outside of buffer view {view} ({} bytes)", bytes.len())),
         }
     }
@@ -174,20 +184,30 @@ impl<'a> Reader<'a> {
         let accessor = self.accessor(index)?;
         match valid(accessor.type_) {
             Some(found) if found == shape => {}
-            Some(found) => return Err(format!("accessor {index} is of type {} where {} is needed", name(found), name(shape))),
+            Some(found) => {
+                return Err(format!("accessor {index} is of type {} where {} is needed", name(found), name(shape)));
+            }
             None => return Err(format!("accessor {index} is of an unknown type where {} is needed", name(shape))),
         }
         self.try_floats(accessor, make).map_err(|e| format!("accessor {index}: {e}"))
     }
 
-    fn try_floats<const N: usize, T>(&self, accessor: &Accessor, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, String> {
+    fn try_floats<const N: usize, T>(
+        &self,
+        accessor: &Accessor,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, String> {
         let component = self.component(accessor)?;
         let bytes = accessor.count.0.saturating_mul(size_of::<T>() as u64);
         let make_room = || self.take(bytes, accessor.count.0);
         let mut out = match accessor.buffer_view {
             Some(view) => {
-                let elements =
-                    self.elements(view, accessor.byte_offset.unwrap_or_default().0, accessor.count.0, N * component.size())?;
+                let elements = self.elements(
+                    view,
+                    accessor.byte_offset.unwrap_or_default().0,
+                    accessor.count.0,
+                    N * component.size(),
+                )?;
                 make_room()?;
                 gather(&elements, accessor.count.0 as usize, component, accessor.normalized, &make)
             }
@@ -218,8 +238,12 @@ impl<'a> Reader<'a> {
         }
         let base = match accessor.buffer_view {
             Some(view) => {
-                let Elements { bytes, stride } =
-                    self.elements(view, accessor.byte_offset.unwrap_or_default().0, accessor.count.0, component.size())?;
+                let Elements { bytes, stride } = self.elements(
+                    view,
+                    accessor.byte_offset.unwrap_or_default().0,
+                    accessor.count.0,
+                    component.size(),
+                )?;
                 Indices::InPlace { bytes, count: accessor.count.0 as usize, stride, size: component.size() }
             }
             None => {
@@ -253,7 +277,8 @@ impl<'a> Reader<'a> {
         let component = valid(indices.component_type).ok_or("has sparse indices of an unknown component type")?.0;
         let at = self.elements(indices.buffer_view, indices.byte_offset.0, count, component.size())?;
         let values = self.elements(values.buffer_view, values.byte_offset.0, count, size)?;
-        let at: Vec<usize> = (0..count as usize).map(|i| component.index(&at.bytes[i * at.stride..]) as usize).collect();
+        let at: Vec<usize> =
+            (0..count as usize).map(|i| component.index(&at.bytes[i * at.stride..]) as usize).collect();
         match at.iter().find(|&&i| i as u64 >= accessor.count.0) {
             Some(i) => Err(format!("replaces element {i} of only {} (sparse)", accessor.count.0)),
             None => Ok(Some((at, values))),

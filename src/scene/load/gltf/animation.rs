@@ -44,7 +44,8 @@ struct SamplerJson {
 
 /// The nodes of the file whose translation, rotation or scale a channel changes.
 pub(super) fn transformed(animations: &[Animation]) -> BTreeSet<usize> {
-    let transforms = |channel: &&ChannelJson| matches!(channel.target.path.as_str(), "translation" | "rotation" | "scale");
+    let transforms =
+        |channel: &&ChannelJson| matches!(channel.target.path.as_str(), "translation" | "rotation" | "scale");
     animations.iter().flat_map(|a| &a.channels).filter(transforms).filter_map(|channel| channel.target.node).collect()
 }
 
@@ -97,7 +98,9 @@ fn read_channel(
     repairs: &mut Vec<String>,
 ) -> Result<Option<Channel>, String> {
     let target = channel.target.node.ok_or_else(|| format!("names no node (its path is `{}`)", channel.target.path))?;
-    let Some(node) = *index.get(target).ok_or_else(|| format!("node {target} does not exist"))? else { return Ok(None) };
+    let Some(node) = *index.get(target).ok_or_else(|| format!("node {target} does not exist"))? else {
+        return Ok(None);
+    };
 
     // the property, and how many numbers it has
     let (property, shape) = match channel.target.path.as_str() {
@@ -137,7 +140,8 @@ fn read_channel(
     let times = match times.get(&input) {
         Some(known) => known.clone(),
         None => {
-            let read: Arc<[f32]> = reader.floats(Index::new(input), Type::Scalar, |[t]: [f32; 1]| t).map_err(within)?.into();
+            let read: Arc<[f32]> =
+                reader.floats(Index::new(input), Type::Scalar, |[t]: [f32; 1]| t).map_err(within)?.into();
             times.insert(input, read.clone());
             read
         }

@@ -184,7 +184,9 @@ pub(super) fn document(text: &[u8], path: &Path) -> Result<(Root, Doubles)> {
             Ok(version) if version.as_str().is_none_or(str::is_empty) => {
                 return Err(Error::input(path, "is not glTF: it has no version"));
             }
-            Ok(serde_json::Value::String(version)) if !version.starts_with("2.") => return Err(other_version(&version, path)),
+            Ok(serde_json::Value::String(version)) if !version.starts_with("2.") => {
+                return Err(other_version(&version, path));
+            }
             _ => return Err(Error::input(path, format!("is not valid glTF JSON: {e}"))),
         },
     };
@@ -267,7 +269,12 @@ pub(super) fn files(document: &Root, gltf: &Path, confine: Option<&Path>) -> Res
 }
 
 /// The bytes of every buffer that a buffer view refers to; others are not read.
-pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path, loading: Loading) -> Vec<BufferBytes<'a>> {
+pub(super) fn buffers<'a>(
+    document: &Root,
+    bin: Option<&'a [u8]>,
+    path: &Path,
+    loading: Loading,
+) -> Vec<BufferBytes<'a>> {
     let mut used = vec![false; document.buffers.len()];
     for view in &document.buffer_views {
         if let Some(used) = used.get_mut(view.buffer.value()) {

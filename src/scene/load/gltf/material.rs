@@ -159,7 +159,8 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
 /// Numbers among the material's `extras`.
 fn parameters(material: &json::Material) -> BTreeMap<String, f32> {
     let extras = material.extras.as_ref().and_then(|e| serde_json::from_str::<BTreeMap<String, Value>>(e.get()).ok());
-    let numbers = extras.unwrap_or_default().into_iter().filter_map(|(name, value)| Some((name, value.as_f64()? as f32)));
+    let numbers =
+        extras.unwrap_or_default().into_iter().filter_map(|(name, value)| Some((name, value.as_f64()? as f32)));
     numbers.filter(|(_, value)| value.is_finite()).collect()
 }
 

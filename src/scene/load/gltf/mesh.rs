@@ -45,7 +45,8 @@ pub(super) fn read(
             "accessor {position} has no data of its own: the extension {DRACO} fills it, which skylit does not support: export the file without mesh compression"
         ));
     }
-    let mut mesh = TriangleMesh { positions: reader.floats(position, Type::Vec3, Vec3::from_array)?, ..Default::default() };
+    let mut mesh =
+        TriangleMesh { positions: reader.floats(position, Type::Vec3, Vec3::from_array)?, ..Default::default() };
     let vertices = mesh.positions.len();
     if u32::try_from(vertices).is_err() {
         return Err(format!("has {vertices} vertices, more than 32-bit indices reach"));

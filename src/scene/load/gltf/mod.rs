@@ -125,7 +125,10 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
             "KHR_texture_basisu" | "EXT_texture_webp" => "export the file with PNG or JPEG textures",
             _ => "export the file without it",
         };
-        return Err(Error::input(path, format!("requires the extension {name}, which skylit does not support: {remedy}")));
+        return Err(Error::input(
+            path,
+            format!("requires the extension {name}, which skylit does not support: {remedy}"),
+        ));
     }
     let required: HashSet<&String> = document.extensions_required.iter().collect();
     scene.report.extensions.extend(document.extensions_used.iter().map(|name| FileExtension {
@@ -199,7 +202,9 @@ impl Meshes<'_> {
 
             // the primitive, with what deforms it
             let tangents = scene.materials[material].needs_tangents();
-            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &mut warn).map_err(input)? else { continue };
+            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &mut warn).map_err(input)? else {
+                continue;
+            };
             let mut deformation = stage.deformation(wanted, primitive, &triangles, at, &mut warn).map_err(input)?;
             let kept = compact::compact(&mut triangles);
             if let (Some(deformation), Some(kept)) = (&mut deformation, kept) {

@@ -78,7 +78,9 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
     let mut parents = vec![0u32; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
         for child in children(node) {
-            *parents.get_mut(child).ok_or_else(|| format!("node {i} has the child {child}, which does not exist"))? += 1;
+            *parents
+                .get_mut(child)
+                .ok_or_else(|| format!("node {i} has the child {child}, which does not exist"))? += 1;
         }
     }
 
@@ -216,14 +218,16 @@ pub(super) fn camera(
 /// # Errors
 /// What is wrong, in words.
 pub(super) fn light(document: &Root, placed: &PlacedNode, index: usize) -> Result<Light, String> {
-    let lights = document.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
+    let lights =
+        document.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
     let light = lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
     let kind = match valid(light.type_) {
         Some(LightType::Point) => LightKind::Point,
         Some(LightType::Directional) => LightKind::Directional { angle: 0.0 },
         Some(LightType::Spot) => {
             // not the crate's default for lights without `spot`, whose outer angle is zero
-            let (inner, outer) = light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));
+            let (inner, outer) =
+                light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));
             let outer = outer.clamp(0.0, FRAC_PI_2);
             LightKind::Spot { inner_angle: inner.clamp(0.0, outer), outer_angle: outer }
         }

@@ -10,7 +10,9 @@ use super::accessor::Reader;
 use super::node::{Doubles, PlacedNode};
 use super::values::text;
 use super::{animation, skin};
-use crate::scene::animation::{Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor};
+use crate::scene::animation::{
+    Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor,
+};
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
 /// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the
@@ -69,7 +71,12 @@ pub(super) struct RigBuilder<'a> {
 }
 
 impl<'a> RigBuilder<'a> {
-    pub fn new(reader: &'a Reader, doubles: &'a Doubles, placed: &'a [PlacedNode], warn: &mut dyn FnMut(String)) -> Self {
+    pub fn new(
+        reader: &'a Reader,
+        doubles: &'a Doubles,
+        placed: &'a [PlacedNode],
+        warn: &mut dyn FnMut(String),
+    ) -> Self {
         let document = reader.document;
         let mut index = vec![None; document.nodes.len()];
         for (at, p) in placed.iter().enumerate() {
@@ -89,7 +96,8 @@ impl<'a> RigBuilder<'a> {
             let local = parts.unwrap_or(p.local);
             let node = &document.nodes[p.node];
             let mesh = node.mesh.and_then(|m| document.meshes.get(m.value()));
-            let targets = |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
+            let targets =
+                |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
             let mut weights = node.weights.clone().or_else(|| mesh?.weights.clone()).unwrap_or_default();
             let count = mesh.and_then(targets).unwrap_or(0);
             // of each node that shows the mesh; an empty list is refused with the scene

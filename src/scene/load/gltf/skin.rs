@@ -71,9 +71,12 @@ pub(super) fn influences(
     let attribute = |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
     let mut sets = Vec::new();
     for set in 0..2 {
-        let (Some(joint), Some(weight)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set))) else { break };
+        let (Some(joint), Some(weight)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set))) else {
+            break;
+        };
         let mut influence = Influences {
-            joints: reader.floats(same_count(reader, joint, vertices)?, Type::Vec4, |j: [f32; 4]| j.map(|j| j as u16))?,
+            joints: reader
+                .floats(same_count(reader, joint, vertices)?, Type::Vec4, |j: [f32; 4]| j.map(|j| j as u16))?,
             weights: reader.floats(same_count(reader, weight, vertices)?, Type::Vec4, |w: [f32; 4]| w)?,
         };
         for (v, (j, w)) in influence.joints.iter_mut().zip(&influence.weights).enumerate() {

@@ -47,7 +47,8 @@ pub(super) fn resolve(
 
     // several images may name one file: the first of them is decoded
     let mut first_of = BTreeMap::new();
-    let content = |i: usize| document.images.get(i).map(|image| (image.uri.as_deref(), image.buffer_view.map(|v| v.value())));
+    let content =
+        |i: usize| document.images.get(i).map(|image| (image.uri.as_deref(), image.buffer_view.map(|v| v.value())));
     let same: BTreeMap<usize, usize> =
         wanted.iter().map(|&i| (i, content(i).map_or(i, |c| *first_of.entry(c).or_insert(i)))).collect();
     wanted.retain(|i| same[i] == *i);
@@ -81,7 +82,8 @@ pub(super) fn resolve(
         let (wrap, filter) = sampler(document, texture.sampler);
         let image = &document.images[source];
         let file = image.uri.as_deref().filter(|u| !uri::is_data(u)).unwrap_or_default();
-        let name = [text(&texture.name), text(&image.name), file].into_iter().find(|n| !n.is_empty()).unwrap_or_default();
+        let name =
+            [text(&texture.name), text(&image.name), file].into_iter().find(|n| !n.is_empty()).unwrap_or_default();
         *place = Some(textures.len());
         textures.push(Texture {
             name: name.to_owned(),

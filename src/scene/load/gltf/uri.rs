@@ -23,7 +23,9 @@ pub(super) enum Uri {
 /// anyway.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
-    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true),
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
 );
 
 /// `text` without a prefix, in capitals or not.
@@ -78,7 +80,8 @@ fn file_path(rest: &str) -> &str {
 /// without a query and a fragment; then, for files with such names, with fewer of these; an
 /// absolute path of another machine last, as a file name beside the glTF file.
 fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
-    let decoded = String::from_utf8(percent_decode(uri.as_bytes()).into_owned()).map_err(|_| "has a URI that is not UTF-8")?;
+    let decoded =
+        String::from_utf8(percent_decode(uri.as_bytes()).into_owned()).map_err(|_| "has a URI that is not UTF-8")?;
     let slashes = decoded.replace('\\', "/");
     let mut names = vec![slashes.clone(), decoded, uri.replace('\\', "/"), uri.to_owned()];
     if let Some(end) = uri.find(['?', '#']) {
@@ -106,7 +109,8 @@ pub(super) fn resolve(paths: &[PathBuf], folder: &Path, confine: Option<&Path>) 
     if let Some(confine) = confine {
         let from = std::fs::canonicalize(folder.join(".")).ok()?;
         let may = |path: &&PathBuf| !confine::leaves(confine, &from, path);
-        let found = paths.iter().filter(may).find_map(|path| confine::below(confine, &from.join(path)).filter(|p| p.is_file()));
+        let found =
+            paths.iter().filter(may).find_map(|path| confine::below(confine, &from.join(path)).filter(|p| p.is_file()));
         if found.is_some() || !paths.iter().all(|path| may(&path)) {
             return found;
         }

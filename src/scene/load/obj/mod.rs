@@ -195,7 +195,8 @@ fn word_ranges(text: &str) -> Vec<(usize, usize)> {
 /// origin for its size, so that single precision is spent on the model. It is the same for all
 /// meshes: those that share a vertex still do.
 fn origin(file: &ObjFile) -> DVec3 {
-    let used = file.groups.iter().flat_map(|g| g.triangles.iter().flatten()).map(|c| file.positions[c.position as usize]);
+    let used =
+        file.groups.iter().flat_map(|g| g.triangles.iter().flatten()).map(|c| file.positions[c.position as usize]);
     let bounds = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
     if bounds.0.x <= bounds.1.x { distant_centre(bounds.0, bounds.1) } else { DVec3::ZERO }
 }

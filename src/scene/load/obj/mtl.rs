@@ -217,7 +217,8 @@ fn map(text: &str) -> Result<Map, String> {
     }
     // (u, v) -> scale * (u, v) + offset with v up; ours has v down on both sides:
     // v' = 1 - (s (1 - v) + o)
-    map.transform = Affine2::from_mat2_translation(Mat2::from_diagonal(scale), Vec2::new(offset.x, 1.0 - scale.y - offset.y));
+    map.transform =
+        Affine2::from_mat2_translation(Mat2::from_diagonal(scale), Vec2::new(offset.x, 1.0 - scale.y - offset.y));
     Ok(map)
 }
 
@@ -279,7 +280,9 @@ mod tests {
         let m = parse("newmtl a\nKd 1 2\nKs 0.5\nd nan\nillum x", &mut |w| warnings.push(w));
         assert_eq!((m.len(), warnings.len(), m[0].specular), (1, 3, Some(Vec3::splat(0.5))), "{warnings:?}");
         let mut warnings = Vec::new();
-        let m = parse("newmtl a\rKD 1 0,5 0 # red\rmap_Ks s.png\rdisp h.png\rmap_aat on\r#map_Ks", &mut |w| warnings.push(w));
+        let m = parse("newmtl a\rKD 1 0,5 0 # red\rmap_Ks s.png\rdisp h.png\rmap_aat on\r#map_Ks", &mut |w| {
+            warnings.push(w)
+        });
         assert_eq!(m[0].diffuse, Some(Vec3::new(1.0, 0.5, 0.0)));
         assert_eq!(warnings, ["line 3: map_Ks is not used", "line 4: disp is not used"]);
     }

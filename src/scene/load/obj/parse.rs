@@ -212,7 +212,8 @@ impl Parser {
             let i: i64 = part.parse().map_err(|_| format!("`{word}` is not a corner of a face"))?;
             let count = count as i64;
             let resolved = if i < 0 { i.checked_add(count) } else { i.checked_sub(1) };
-            match resolved.filter(|r| (0..count).contains(r)).and_then(|r| u32::try_from(r).ok()).filter(|&r| r != NONE) {
+            match resolved.filter(|r| (0..count).contains(r)).and_then(|r| u32::try_from(r).ok()).filter(|&r| r != NONE)
+            {
                 Some(r) => Ok(r),
                 None => Err(format!("the face refers to {what} {i}, but there are {count} so far")),
             }

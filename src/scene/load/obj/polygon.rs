@@ -20,7 +20,10 @@ impl PolygonTriangulator {
     /// indices of corners and with the polygon's orientation. `None` where the fan is right, or
     /// nothing is: the polygon is a triangle, convex, a quad whose fan starts at the dent, has no
     /// area, or more than [`MAX_CORNERS`].
-    pub(super) fn cut(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<impl Iterator<Item = [usize; 3]>> {
+    pub(super) fn cut(
+        &mut self,
+        corners: impl Iterator<Item = DVec3> + Clone,
+    ) -> Option<impl Iterator<Item = [usize; 3]>> {
         self.project(corners)?;
         if self.points.len() > MAX_CORNERS {
             return None;

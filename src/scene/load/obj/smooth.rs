@@ -10,7 +10,8 @@ use super::parse::{Corner, Group, NONE, ObjFile};
 /// triangles of their meshes are flat. Returns the number of meshes that got normals.
 pub(super) fn smooth(file: &mut ObjFile) -> usize {
     let lacks = |t: &[Corner; 3]| t.iter().any(|c| c.normal == NONE);
-    let is_smoothed = |g: &Group| runs(g).any(|(from, to, number)| number > 0 && g.triangles[from..to].iter().any(lacks));
+    let is_smoothed =
+        |g: &Group| runs(g).any(|(from, to, number)| number > 0 && g.triangles[from..to].iter().any(lacks));
     let smoothed: Vec<bool> = file.groups.iter().map(is_smoothed).collect();
     if !smoothed.contains(&true) {
         return 0;

@@ -120,7 +120,8 @@ impl<'a> Textures<'a> {
         let named = files.iter().zip(&pictures).find_map(|(file, picture)| file.as_ref().filter(|_| picture.is_some()));
         let name = named?.1.file_name().unwrap_or_default().to_string_lossy().into_owned();
         // what two maps are combined to has a texel for each of the larger one
-        let texels = pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
+        let texels =
+            pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
         self.loading.budget.take(4 * texels, || format!("the texture {name}")).ok()?;
         let DecodedImage { width, height, texels } = make(pictures);
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
