@@ -13,8 +13,8 @@ use skylit::realtime::{Filter, FilterKind, Settings};
 use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use skylit::stress::{
-    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, counters, degenerate, determinism, direct_light,
-    display, hot_pixel, long_runs, sampling, scale, scene, transparency, watertight,
+    Check, Quiet, SECTIONS, Setup, StressSession, Verdict, Watch, contact, counters, degenerate, determinism,
+    direct_light, display, hot_pixel, long_runs, sampling, scale, scene, transparency, watertight,
 };
 use skylit::tracer::TracerKind;
 
@@ -26,7 +26,7 @@ fn setup() -> Setup {
 fn holds(name: &str, setup: Setup) -> Vec<Check> {
     let section = SECTIONS.iter().find(|s| s.name == name).unwrap();
     let mut quiet = Quiet;
-    let mut session = Session::new(setup, &mut quiet);
+    let mut session = StressSession::new(setup, &mut quiet);
     let checks = session.run(section).unwrap();
     for check in &checks {
         println!("{:?} {} {}: {}; {}", check.verdict, check.tracer_name(), check.name, check.figure(), check.sentence);
@@ -103,16 +103,16 @@ fn gpu_stress_surfaces_in_one_place_hold() {
 fn gpu_stress_catches_a_triangle_that_is_passed_over() {
     const COUNT: u32 = 20_000;
     let mut quiet = Quiet;
-    let mut judge = |scenes: &[Scene; 2]| {
+    let mut compare_hits = |scenes: &[Scene; 2]| {
         let mut watch = Watch::new(&mut quiet);
         degenerate::check_as_one(&setup(), TracerKind::Compute, "moved", COUNT, scenes, &mut watch).unwrap()
     };
     let mut scenes = degenerate::overlapping(COUNT, false);
-    assert_eq!(judge(&scenes).verdict, Verdict::Holds);
+    assert_eq!(compare_hits(&scenes).verdict, Verdict::Holds);
     let mesh = triangles(&mut scenes[0].meshes[0].geometry);
     let last = mesh.indices[COUNT as usize - 1];
     last.into_iter().for_each(|i| mesh.positions[i as usize].z += 1e-3);
-    fails(&judge(&scenes));
+    fails(&compare_hits(&scenes));
 }
 
 /// Section 1: a sheet over a plane that should not occlude itself, a groove that is narrower than its closed form, and detail that positions do not hold.
@@ -177,17 +177,20 @@ fn gpu_stress_catches_a_wrong_triangle() {
     let (scene, _) = degenerate::without_area(60, 0);
     let oracle = Oracle::new(&scene, DVec3::ZERO);
     let rays = random_rays(&oracle, 20_000, 3);
-    let truth = degenerate::truth(&oracle, &rays);
-    let mut judge = |scene: &Scene| {
+    let truth = degenerate::trace_oracle(&oracle, &rays);
+    let mut compare_hits = |scene: &Scene| {
         let tracer = setup.tracer(TracerKind::Compute, scene).unwrap();
-        degenerate::parity_check("moved", &degenerate::judge(&tracer, &oracle, &rays, &truth, &mut watch).unwrap())
+        degenerate::parity_check(
+            "moved",
+            &degenerate::compare_hits(&tracer, &oracle, &rays, &truth, &mut watch).unwrap(),
+        )
     };
-    assert_eq!(judge(&scene).verdict, Verdict::Holds);
+    assert_eq!(compare_hits(&scene).verdict, Verdict::Holds);
     let mut moved = scene.clone();
     let mesh = triangles(&mut moved.meshes[0].geometry);
     let sound = mesh.indices[5];
     sound.into_iter().for_each(|i| mesh.positions[i as usize] += Vec3::splat(0.02));
-    fails(&judge(&moved));
+    fails(&compare_hits(&moved));
     let file = degenerate::triangle_file(["0 0 0", "1 0 0", "0 1 0"]);
     fails(&degenerate::check_file(&setup, TracerKind::Compute, "file", file, true, &mut watch).unwrap());
 }

@@ -13,7 +13,7 @@ use skylit::output::parse_size;
 use skylit::tracer::DeviceSettings;
 use skylit::verify::golden::{Golden, REPLICATES};
 use skylit::verify::manifest::Manifest;
-use skylit::verify::session::Session;
+use skylit::verify::session::VerifySession;
 use skylit::{Error, Result};
 
 /// Rates of false alarms that are looked at.
@@ -27,7 +27,7 @@ fn main() -> Result<()> {
     let size = rest.get(1).map(|s| parse_size(s)).transpose().map_err(Error::Usage)?;
     let spp: Option<u32> = rest.get(2).map(|n| n.parse()).transpose().map_err(|_| usage())?;
     let manifest = Manifest::load(Path::new(folder))?;
-    let mut session = Session::open(&manifest, &DeviceSettings::default())?;
+    let mut session = VerifySession::open(&manifest, &DeviceSettings::default())?;
     println!("frame | golden image | runs | below {}", RATES.map(|r| r.to_string()).join(" | "));
     for name in names.split(',') {
         let mut frame = manifest.frames.iter().find(|f| f.name == name).cloned().ok_or_else(usage)?;

@@ -21,7 +21,7 @@ use crate::terminal::progress::Progress;
 const STEPS: u64 = 1000;
 
 /// A running benchmark, with its arguments and its record.
-pub struct Session<'a, A> {
+pub struct BenchSession<'a, A> {
     pub args: &'a A,
     pub device: BenchDevice,
     pub peers: Vec<Peer>,
@@ -39,7 +39,7 @@ pub struct Session<'a, A> {
     _plan: FilePlan,
 }
 
-impl<'a, A> Session<'a, A> {
+impl<'a, A> BenchSession<'a, A> {
     /// Opens the device. `record` makes the record to fill, with the settings of the baseline.
     pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> Record) -> Result<Self> {
         let start = Instant::now();

@@ -68,7 +68,7 @@ impl ImageSet {
             k if k == reference => Ok(None),
             _ => comparison::compare(&entry.image, &entries[reference].image, options)
                 .map(Some)
-                .map_err(|e| named(e, &title(&entries, k), &title(&entries, reference))),
+                .map_err(|e| name_images(e, &title(&entries, k), &title(&entries, reference))),
         });
         let comparisons = comparisons.collect::<Result<Vec<_>>>()?;
         let mut set = Self { entries, reference, comparisons, warnings: Vec::new() };
@@ -109,7 +109,7 @@ fn title(entries: &[Entry], index: usize) -> String {
 }
 
 /// The same error, with the images that it is about.
-fn named(error: Error, image: &str, reference: &str) -> Error {
+fn name_images(error: Error, image: &str, reference: &str) -> Error {
     let names = format!("{image} against {reference}");
     match error {
         Error::Usage(text) => Error::Usage(format!("{names}: {text}")),

@@ -4,8 +4,8 @@
 use glam::{DAffine3, DVec3};
 
 use super::closed_forms::{self, options};
-use super::degenerate::{judge, parity_check, ray, scene_of, triangles, truth};
-use super::{Check, Section, Session};
+use super::degenerate::{compare_hits, parity_check, ray, scene_of, trace_oracle, triangles};
+use super::{Check, Section, StressSession};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::integrators::rays::{Mode, trace};
@@ -204,7 +204,7 @@ fn bridged(
     Ok(hits.iter().filter(|h| !h.is_hit()).count())
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
     let count = effort.pick(20_000, 1_000_000);
 
@@ -213,9 +213,9 @@ fn run(session: &mut Session) -> Result<()> {
     let plane = analytic::plane(10.0, SceneTransform::default());
     let oracle = Oracle::new(&plane, plane.origin());
     let rays = grazing_rays(count);
-    let expected = truth(&oracle, &rays);
+    let expected = trace_oracle(&oracle, &rays);
     session.measure_each(name, &kinds, |s, kind, w| {
-        Ok(parity_check(name, &judge(&s.tracer(kind, &plane)?, &oracle, &rays, &expected, w)?))
+        Ok(parity_check(name, &compare_hits(&s.tracer(kind, &plane)?, &oracle, &rays, &expected, w)?))
     })?;
 
     let name = "seen at 1e-4 rad, a plane does not occlude itself";
@@ -231,7 +231,7 @@ fn run(session: &mut Session) -> Result<()> {
     let expected = oracle.trace_closest(&rays);
     let name = "rays that start on edges and vertices";
     session.measure_each(name, &kinds, |s, kind, w| {
-        Ok(parity_check(name, &judge(&s.tracer(kind, &body)?, &oracle, &rays, &expected, w)?))
+        Ok(parity_check(name, &compare_hits(&s.tracer(kind, &body)?, &oracle, &rays, &expected, w)?))
     })?;
 
     let name = "close to a corner, a box does not occlude itself";

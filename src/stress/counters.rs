@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use super::long_runs::{RADIANCE, constant, traced};
 use super::sampling::{not_finite, render};
-use super::{Check, Session, Setup, Watch};
+use super::{Check, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
@@ -163,7 +163,7 @@ pub fn frame_distance(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
     (a - b).abs() / e.hypot(f)
 }
 
-pub(super) fn run(session: &mut Session) -> Result<()> {
+pub(super) fn run(session: &mut StressSession) -> Result<()> {
     let effort = session.setup().effort();
     let (shading, kinds) = (session.setup().shading_tracers(), session.setup().tracers());
     let steps = effort.pick(64, 4096);

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Check, Section, Session, Setup, Watch};
+use super::{Check, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
@@ -246,12 +246,12 @@ pub fn overlapping(count: u32, as_instances: bool) -> [Scene; 2] {
 }
 
 /// Answers of the oracle that tests every primitive.
-pub fn truth(oracle: &Oracle, rays: &[Ray]) -> Vec<OracleHit> {
+pub fn trace_oracle(oracle: &Oracle, rays: &[Ray]) -> Vec<OracleHit> {
     rays.par_iter().map(|r| oracle.brute_force_closest(r)).collect()
 }
 
 /// A tracer's answers, closest hits and any hits, against the truth.
-pub fn judge(
+pub fn compare_hits(
     tracer: &Tracer,
     oracle: &Oracle,
     rays: &[Ray],
@@ -265,7 +265,7 @@ pub fn judge(
     Ok([judge_closest(oracle, rays, &closest, truth, rounding), judge_any(oracle, rays, &any, &occluded, rounding)])
 }
 
-/// The check that goes with [`judge`]: no answer that rounding does not explain.
+/// The check that goes with [`compare_hits`]: no answer that rounding does not explain.
 pub fn parity_check(name: &str, reports: &[ParityReport; 2]) -> Check {
     let [closest, any] = reports;
     let mut sentence =
@@ -310,7 +310,7 @@ fn full_tracer(setup: &Setup, kind: TracerKind, scene: &Scene) -> Result<Tracer>
     Tracer::new(setup.device(), kind, &FlatScene::new(scene), NEEDS)
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let effort = session.setup().effort();
     let kinds = session.setup().tracers();
     let (count, rays) = effort.pick((600, 3000), (4000, 200_000));
@@ -342,11 +342,11 @@ fn run(session: &mut Session) -> Result<()> {
     // Hits agree with the oracle, and images are numbers.
     for (name, (scene, set)) in &cases {
         let oracle = oracle_of(scene);
-        let (truth, images) = (truth(&oracle, set), format!("images: {name}"));
+        let (truth, images) = (trace_oracle(&oracle, set), format!("images: {name}"));
         for kind in &kinds {
             session.measure_these(&[name, &images], Some(*kind), |s, w| {
                 let tracer = full_tracer(s, *kind, scene)?;
-                let parity = parity_check(name, &judge(&tracer, &oracle, set, &truth, w)?);
+                let parity = parity_check(name, &compare_hits(&tracer, &oracle, set, &truth, w)?);
                 let unsound = unsound_values(&tracer, scene, w)?;
                 let values = Check::at_most(images.as_str(), unsound as f64, "values", 0.0);
                 Ok(vec![parity, values.says("that are no numbers, or out of range")])
@@ -392,7 +392,7 @@ pub fn needle_bodies() -> Vec<(String, Scene)> {
     bodies.into_iter().flat_map(turned).collect()
 }
 
-fn needles(session: &mut Session) -> Result<()> {
+fn needles(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
     for (what, scene) in needle_bodies() {
         let name = format!("needles do not meet themselves: {what}");
@@ -450,7 +450,7 @@ pub fn check_as_one(
     Ok(Check::at_most(name, value, "unexplained", 0.0).says(sentence))
 }
 
-fn coincident_triangles(session: &mut Session) -> Result<()> {
+fn coincident_triangles(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
     for kind in kinds {
         // drivers test them all
@@ -470,7 +470,7 @@ fn coincident_triangles(session: &mut Session) -> Result<()> {
 }
 
 /// Instances in one place, of a triangle: all alike, and each of its own size.
-fn one_place(session: &mut Session) -> Result<()> {
+fn one_place(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().shading_tracers();
     let count = session.setup().effort().pick(10_000, 1_000_000);
     let one = triangles([[DVec3::new(-1.0, -0.5, 0.1), DVec3::new(1.0, -0.4, -0.2), DVec3::new(0.1, 1.0, 0.3)]]);
@@ -526,7 +526,7 @@ pub fn check_file(
     Ok(Check::none_of(name, bad as u64, "values", true).says("loaded; values of its images that are no numbers"))
 }
 
-fn files(session: &mut Session) -> Result<()> {
+fn files(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().tracers();
     for &(what, corners, must_fail) in FILES {
         let name = format!("a file with coordinates of {what}");

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use super::closed_forms::{self, options};
 use super::sampling;
-use super::{Check, Section, Session, Setup, Watch};
+use super::{Check, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
@@ -48,7 +48,7 @@ fn scene(name: &str) -> Result<Scene> {
     builtin::by_name(name).ok_or_else(|| Error::Scene(format!("no built-in scene {name}")))
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().tracers();
     let (size, spp) = session.setup().effort().pick((64, 4), (256, 64));
     let stairs = scene("stairs")?;
@@ -150,7 +150,7 @@ fn visibility(image: &Image) -> Result<&[f32]> {
     image.f32("Y").ok_or_else(|| Error::CheckFailed("an image without ambient visibility".into()))
 }
 
-fn restarts(session: &mut Session) -> Result<()> {
+fn restarts(session: &mut StressSession) -> Result<()> {
     let (program, is_cpu) = (session.setup().program.clone(), session.setup().device().info.is_cpu());
     let (restart, threads) = ("the program started again", "threads and vector widths of the CPU driver");
     let Some(program) = program else {

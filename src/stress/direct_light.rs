@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::sampling;
 use super::scale::{linear_maps, load_text, through};
-use super::{Session, Watch};
+use super::{StressSession, Watch};
 use crate::error::Result;
 use crate::film::SampleSettings;
 use crate::integrators::path::PathOptions;
@@ -165,7 +165,7 @@ pub fn nested(scene: &Scene) -> Result<Scene> {
     Ok(loaded)
 }
 
-pub(super) fn run(session: &mut Session) -> Result<()> {
+pub(super) fn run(session: &mut StressSession) -> Result<()> {
     for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
         for (what, scene, expected) in lit_floors(scale) {
             measure(session, &format!("{what}, scale {scale:e}"), expected, |_| Ok(scene.clone()))?;
@@ -196,7 +196,7 @@ fn placed_maps() -> Vec<(&'static str, DMat3)> {
 }
 
 fn measure(
-    session: &mut Session,
+    session: &mut StressSession,
     name: &str,
     expected: f64,
     scene: impl Fn(&mut Watch) -> Result<Scene>,

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::long_runs::{frames_off, traced};
 use super::sampling::{self, emitter};
-use super::{Check, Section, Session};
+use super::{Check, Section, StressSession};
 use crate::accel::flatten::FlatScene;
 use crate::colour::{srgb_byte, srgb_decode, srgb_encode};
 use crate::error::Result;
@@ -61,7 +61,7 @@ pub fn filters() -> Vec<(&'static str, Settings)> {
     vec![("box filter", base), ("a-trous filter", Settings { filter: a_trous, ..base })]
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     for map in TONE_MAPS {
         let name = format!("tone map {map} is monotone");
         session.measure(&name, None, |_, _| {
@@ -90,7 +90,7 @@ fn run(session: &mut Session) -> Result<()> {
     extremes(session)
 }
 
-fn constants(session: &mut Session) -> Result<()> {
+fn constants(session: &mut StressSession) -> Result<()> {
     let (kinds, frames) = (session.setup().shading_tracers(), session.setup().effort().pick(6, 200));
     let plane = analytic::plane(20.0, SceneTransform::default());
     let closed = analytic::closed_box(2.0, SceneTransform::default());
@@ -116,7 +116,7 @@ fn constants(session: &mut Session) -> Result<()> {
 }
 
 /// Radiance at the ends of single precision arrives on the film, and its picture is a picture.
-fn extremes(session: &mut Session) -> Result<()> {
+fn extremes(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().shading_tracers();
     // from 1e30 on a sample counts as infinite
     for radiance in [9e29f32, 1e-30] {

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use super::degenerate::random;
 use super::sampling::{self, emitter, matte, scene_of};
-use super::{Check, Session, Setup, Watch};
+use super::{Check, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::denoise::{self, DenoiseInput, Denoiser, Features};
 use crate::error::Result;
@@ -290,7 +290,7 @@ pub fn check_rare_occlusion(name: &str, filtered: f64, unfiltered: f64) -> Check
         .says(format!("{ratio:.3} of the occlusion that frames without a filter have"))
 }
 
-pub(super) fn run(session: &mut Session) -> Result<()> {
+pub(super) fn run(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
     for filter in [FilterKind::Box, FilterKind::Atrous] {
         for hot in HOT {

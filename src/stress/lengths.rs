@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 
 use super::closed_forms::{self, Case, on_plane, options};
 use super::degenerate::{random, ray, scene_of};
-use super::{Check, Section, Session, Setup, Watch};
+use super::{Check, Section, Setup, StressSession, Watch};
 use crate::error::Result;
 use crate::integrators::rays::{Mode, trace};
 use crate::oracle::closed_form::polygon_form_factor;
@@ -182,9 +182,9 @@ fn can_turn(length: f64, turn: DQuat) -> bool {
     turn == DQuat::IDENTITY || length <= 1e4
 }
 
-/// A check that is held where its bound is meant for this tracer, and reported elsewhere.
-fn held(check: Check, is_held: bool) -> Check {
-    if is_held { check } else { Check::reported(check.name, check.value, check.unit).says(check.sentence) }
+/// A check whose bound counts only where it is meant for the tracer.
+fn bound_if(check: Check, is_bound: bool) -> Check {
+    if is_bound { check } else { Check::reported(check.name, check.value, check.unit).says(check.sentence) }
 }
 
 fn check_kerb(setup: &Setup, kind: TracerKind, name: &str, kerb: &Kerb, watch: &mut Watch) -> Result<Check> {
@@ -206,10 +206,10 @@ fn check_hits(
     let [t, point] = kerb.errors(&setup.tracer(kind, &kerb.scene)?, 4000, watch)?;
     let check = Check::at_most(name, t.max(point), "of the distance", hit_bound(length));
     let check = check.says(format!("off: the distance by {t:.1e}, the point between the corners by {point:.1e}"));
-    Ok(held(check, kind == TracerKind::Compute))
+    Ok(bound_if(check, kind == TracerKind::Compute))
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().tracers();
     for (k, length) in LENGTHS.into_iter().enumerate() {
         for (orientation, turn) in turns().into_iter().filter(|t| can_turn(length, t.1)) {
@@ -218,7 +218,7 @@ fn run(session: &mut Session) -> Result<()> {
             let name = format!("a wall on a floor, length {length:e}, {orientation}");
             // beyond, rays start off the floor at a height that matters beside the wall's
             session.measure_each(&name, &kinds, |s, kind, w| {
-                Ok(held(check_kerb(s, kind, &name, &kerb, w)?, length <= 1e6))
+                Ok(bound_if(check_kerb(s, kind, &name, &kerb, w)?, length <= 1e6))
             })?;
             let name = format!("hits of a wall, length {length:e}, {orientation}");
             session.measure_each(&name, &kinds, |s, kind, w| check_hits(s, kind, &name, &kerb, length, w))?;
@@ -228,7 +228,7 @@ fn run(session: &mut Session) -> Result<()> {
                 session.measure_each(&name, &kinds, |s, kind, w| {
                     let check = super::scale::check_exact(s, kind, &name, &scene, 0.0, w)?;
                     // beyond, ray origins and edges are rounded to a thousandth of the box's width
-                    Ok(held(check, length <= 1e3))
+                    Ok(bound_if(check, length <= 1e3))
                 })?;
             }
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::sampling::{matte, render, scene_of};
-use super::{Check, Section, Session, Setup, Watch};
+use super::{Check, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
@@ -128,7 +128,7 @@ pub fn traced(preset: Preset) -> Settings {
     Settings { primary: Some(Primary::Traced), ..preset.settings() }
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let effort = session.setup().effort();
     let shading = session.setup().shading_tracers();
     let samples = effort.pick(1u32 << 14, 1_000_000);

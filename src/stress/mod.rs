@@ -43,7 +43,7 @@ use serde::Serialize;
 
 pub use check::{Bound, Check, Verdict, number};
 pub use options::{Effort, Options};
-pub use session::{Observer, Quiet, Section, Session, Setup, Watch};
+pub use session::{Observer, Quiet, Section, Setup, StressSession, Watch};
 
 use crate::error::{Error, Result};
 use crate::tracer::DeviceSettings;
@@ -117,7 +117,7 @@ impl Summary {
 pub fn run(options: &Options, settings: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
     let start = Instant::now();
     let sections = sections(options)?;
-    let mut session = Session::new(Setup::open(options, settings)?, observer);
+    let mut session = StressSession::new(Setup::open(options, settings)?, observer);
     session.wanted.clone_from(&options.checks);
     let mut checks = Vec::new();
     for (k, section) in sections.iter().enumerate() {

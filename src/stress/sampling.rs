@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::{Check, Effort, Section, Session, Setup, Watch};
+use super::{Check, Effort, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Film;
@@ -159,7 +159,7 @@ pub fn smooth_plastic_furnace(size: u32) -> f64 {
     seen.sum::<f64>() / f64::from(size * size)
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
     let options = |spp: u32| PathOptions { samples: SampleSettings::new([16, 16], spp, 3), ..Default::default() };
     let (few, many) = (effort.pick(16, 1024), effort.pick(64, 16_384));
@@ -207,7 +207,7 @@ fn run(session: &mut Session) -> Result<()> {
     lights(session, &kinds, &options(few))
 }
 
-fn environments(session: &mut Session, kinds: &[TracerKind], options: &PathOptions) -> Result<()> {
+fn environments(session: &mut StressSession, kinds: &[TracerKind], options: &PathOptions) -> Result<()> {
     let lit = |environment: Environment| Scene { environment, ..furnace(1.0, matte(1.0)) };
     let full = session.setup().effort().pick(1024, 16_384);
     let mut cases = vec![
@@ -243,7 +243,7 @@ fn environments(session: &mut Session, kinds: &[TracerKind], options: &PathOptio
     Ok(())
 }
 
-fn lights(session: &mut Session, kinds: &[TracerKind], options: &PathOptions) -> Result<()> {
+fn lights(session: &mut StressSession, kinds: &[TracerKind], options: &PathOptions) -> Result<()> {
     let [albedo, reflected] = [0.6f64, 0.6 / std::f64::consts::PI];
     let floor = |lights: Vec<Light>| {
         let camera = Camera::look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, DVec3::Z, 0.02);

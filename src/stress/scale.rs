@@ -5,7 +5,7 @@ use base64::Engine as _;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
 use super::closed_forms::{self, Case, on_plane, options};
-use super::{Check, Section, Session, Setup, Watch};
+use super::{Check, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::integrators::rays::{Mode, trace};
@@ -217,7 +217,7 @@ fn place_text(place: &SceneTransform) -> String {
     }
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
 
     // Planes are 1 and closed boxes 0, wherever they are.
@@ -329,7 +329,7 @@ pub fn traced_step(tracer: &Tracer, scene: &Scene, watch: &mut Watch) -> Result<
     Ok(f64::from(hits[0].t) - f64::from(hits[1].t))
 }
 
-fn georeferenced(session: &mut Session) -> Result<()> {
+fn georeferenced(session: &mut StressSession) -> Result<()> {
     let kinds = session.setup().tracers();
     let name = "a millimetre at 4e6 m, in translations of nested nodes";
     session.measure_each(name, &kinds, |s, kind, w| {

@@ -9,10 +9,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::closed_forms::{self, options};
-use super::degenerate::{judge, parity_check};
+use super::degenerate::{compare_hits, parity_check};
 use super::overlaps::Overlaps;
 use super::sampling::{mean_of, not_finite, render};
-use super::{Check, Section, Session, Setup, Watch, number};
+use super::{Check, Section, Setup, StressSession, Watch, number};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
@@ -216,7 +216,7 @@ fn bad_texels(texels: &TexelData) -> u64 {
     }
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     if session.setup().scene().is_none() {
         let name = "the scene";
         return session.measure(name, None, |_, _| Ok(Check::not_applicable(name, "no scene was named")));
@@ -483,7 +483,7 @@ fn name_or_number(name: &str, number: u32) -> String {
     if name.is_empty() { format!("instance {number}") } else { format!("`{name}`") }
 }
 
-fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
+fn rays(session: &mut StressSession, kinds: &[TracerKind]) -> Result<()> {
     let effort = session.setup().effort();
     let parity_name = "hits against the f64 oracle";
     let leak_name = "rays at shared edges";
@@ -507,7 +507,7 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
         let set = mixed_rays(&oracle, &view, effort.pick(30_000, 10_000_000), 1);
         let truth = oracle.trace_closest(&set);
         session.measure_each(parity_name, kinds, |s, kind, w| {
-            let reports = judge(&s.tracer(kind, &scene)?, &oracle, &set, &truth, w)?;
+            let reports = compare_hits(&s.tracer(kind, &scene)?, &oracle, &set, &truth, w)?;
             let check = parity_check(parity_name, &reports);
             // as the gate of tests/tracer
             let bound = (1e-5 * (reports[0].rays + reports[1].rays) as f64).ceil();
@@ -539,7 +539,7 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
     })
 }
 
-fn images(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
+fn images(session: &mut StressSession, kinds: &[TracerKind]) -> Result<()> {
     let (effort, shading) = (session.setup().effort(), session.setup().shading_tracers());
     let name = "ambient occlusion image";
     session.measure_each(name, kinds, |s, kind, w| {

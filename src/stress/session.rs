@@ -25,7 +25,7 @@ pub struct Section {
     pub about: &'static str,
     /// True if the section is about the user's scene; the others are about built-in scenes.
     pub of_scene: bool,
-    pub run: fn(&mut Session) -> Result<()>,
+    pub run: fn(&mut StressSession) -> Result<()>,
 }
 
 /// Learns of checks as they are made.
@@ -131,7 +131,7 @@ impl Setup {
 }
 
 /// A run under way: sections leave their checks here.
-pub struct Session<'a> {
+pub struct StressSession<'a> {
     pub(super) setup: Setup,
     pub(super) observer: &'a mut dyn Observer,
     section: &'static str,
@@ -140,7 +140,7 @@ pub struct Session<'a> {
     checks: Vec<Check>,
 }
 
-impl<'a> Session<'a> {
+impl<'a> StressSession<'a> {
     /// A session that makes all checks, and has made none.
     pub fn new(setup: Setup, observer: &'a mut dyn Observer) -> Self {
         Self { setup, observer, section: "", wanted: Vec::new(), checks: Vec::new() }

@@ -3,9 +3,9 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::degenerate::{judge, parity_check, ray, truth};
+use super::degenerate::{compare_hits, parity_check, ray, trace_oracle};
 use super::sampling::{add, check_mean, furnace, glass, matte, scene_of};
-use super::{Check, Section, Session};
+use super::{Check, Section, StressSession};
 use crate::error::Result;
 use crate::film::SampleSettings;
 use crate::film::{Control, camera};
@@ -55,7 +55,7 @@ pub fn layers(count: u32, alpha: f32) -> (Scene, f64) {
     (scene, (1.0 - f64::from(alpha)).powi(count as i32))
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().tracers(), session.setup().effort());
     for (what, alpha, expected) in [("at", 0.5f32, 100), ("just below", 0.5f32.next_down(), 0)] {
         let name = format!("alpha {what} its cutoff");
@@ -74,7 +74,7 @@ fn run(session: &mut Session) -> Result<()> {
         let rays = mixed_rays(&oracle, &view, effort.pick(20_000, 1_000_000), 1);
         let expected = oracle.trace_closest(&rays);
         session.measure_each(&name, &kinds, |s, kind, w| {
-            let reports = judge(&s.tracer(kind, &scene)?, &oracle, &rays, &expected, w)?;
+            let reports = compare_hits(&s.tracer(kind, &scene)?, &oracle, &rays, &expected, w)?;
             let check = parity_check(&name, &reports);
             let bound = 1e-5 * (reports[0].rays + reports[1].rays) as f64;
             Ok(Check::at_most(name.as_str(), check.value, "unexplained", bound).says(check.sentence))
@@ -105,14 +105,14 @@ fn run(session: &mut Session) -> Result<()> {
             ray(from, DVec3::new(0.3, 1e5 + 1.0, 0.2) + b * 1.5 - from)
         })
         .collect();
-    let expected = truth(&oracle, &rays);
+    let expected = trace_oracle(&oracle, &rays);
     session.measure_each(name, &kinds, |s, kind, w| {
-        Ok(parity_check(name, &judge(&s.tracer(kind, &pair)?, &oracle, &rays, &expected, w)?))
+        Ok(parity_check(name, &compare_hits(&s.tracer(kind, &pair)?, &oracle, &rays, &expected, w)?))
     })?;
     glasses(session)
 }
 
-fn glasses(session: &mut Session) -> Result<()> {
+fn glasses(session: &mut StressSession) -> Result<()> {
     let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
     let options =
         PathOptions { samples: SampleSettings::new([16, 16], effort.pick(64, 16_384), 3), ..Default::default() };

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{Check, Section, Session};
+use super::{Check, Section, StressSession};
 use crate::error::Result;
 use crate::film::Control;
 use crate::integrators::rays::{Mode, trace};
@@ -46,16 +46,16 @@ pub fn leaks(tracer: &Tracer, rays: &[Ray], control: &mut dyn Control) -> Result
 /// The check of a closed scene: none of `rays` may leave it through the compute tracer. Leaks of
 /// hardware tracers are their driver's affair, and reported.
 pub fn check(tracer: &Tracer, name: &str, rays: &[Ray], control: &mut dyn Control) -> Result<Check> {
-    Ok(held(tracer.kind(), name, leaks(tracer, rays, control)?, rays.len()))
+    Ok(check_leaks(tracer.kind(), name, leaks(tracer, rays, control)?, rays.len()))
 }
 
 /// See [`check`]: how many of `rays` leaked, asked for any hit and for the closest.
-fn held(kind: TracerKind, name: &str, [any, closest]: [usize; 2], rays: usize) -> Check {
+fn check_leaks(kind: TracerKind, name: &str, [any, closest]: [usize; 2], rays: usize) -> Check {
     Check::none_of(name, any.max(closest) as u64, "leaks", kind == TracerKind::Compute)
         .says(format!("of {rays}; {any} asked for any hit, {closest} for the closest"))
 }
 
-fn run(session: &mut Session) -> Result<()> {
+fn run(session: &mut StressSession) -> Result<()> {
     let effort = session.setup().effort();
     let mut scenes = leak_scenes();
     // the ends of the range, which its middle does not reach
@@ -78,16 +78,16 @@ fn run(session: &mut Session) -> Result<()> {
         for (kind, sum) in kinds.iter().zip(&mut sums) {
             session.measure(&name, Some(*kind), |s, w| {
                 let (tracer, each) = (s.tracer(*kind, scene)?, count(*kind) / scenes.len());
-                let (mut found, mut asked) = ([0, 0], 0);
+                let (mut found, mut traced) = ([0, 0], 0);
                 // in parts, which fit into memory
                 for part in 0..each.div_ceil(PART) {
                     let rays = leak_rays(&oracle, PART.min(each - part * PART), 7 + part as u32);
                     let [any, closest] = leaks(&tracer, &rays, w)?;
                     found = [found[0] + any, found[1] + closest];
-                    asked += rays.len();
+                    traced += rays.len();
                 }
-                let check = held(*kind, &name, found, asked);
-                *sum = (sum.0 + check.value as u64, sum.1 + asked as u64);
+                let check = check_leaks(*kind, &name, found, traced);
+                *sum = (sum.0 + check.value as u64, sum.1 + traced as u64);
                 Ok(check)
             })?;
         }

@@ -2,7 +2,7 @@
 
 use super::golden::{FIRST_SEED, Golden, Origin, REPLICATES};
 use super::manifest::{Frame, Manifest, names_driver};
-use super::session::Session;
+use super::session::VerifySession;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::DeviceInfo;
@@ -49,7 +49,7 @@ pub fn check_driver(manifest: &Manifest, info: &DeviceInfo) -> Result<()> {
 }
 
 /// The tracer of a frame's golden image: the device's own choice, if the frame is rendered with it.
-pub fn tracer(session: &Session, frame: &Frame) -> Result<TracerKind> {
+pub fn tracer(session: &VerifySession, frame: &Frame) -> Result<TracerKind> {
     let kinds: Vec<_> = session.tracers(&frame.tracers).into_iter().filter(|k| k.1).map(|k| k.0).collect();
     let (auto, _) = TracerKind::auto(session.info());
     let chosen = kinds.iter().copied().find(|k| *k == auto).or(kinds.first().copied());
@@ -61,7 +61,7 @@ pub fn tracer(session: &Session, frame: &Frame) -> Result<TracerKind> {
 /// # Errors
 /// Errors of the renderer; [`Error::CheckFailed`] for an image too noisy for the bias to be found.
 pub fn render(
-    session: &mut Session,
+    session: &mut VerifySession,
     manifest: &Manifest,
     frame: &Frame,
     kind: TracerKind,

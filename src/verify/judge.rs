@@ -81,7 +81,7 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     };
     let mut checks = vec![Check::new("finite", broken == 0, text, json!({ "pixels": broken }))];
     if tolerance.exact {
-        checks.push(exact(frame, image, golden)?);
+        checks.push(check_exact(frame, image, golden)?);
         return Ok(Judgement { checks });
     }
     let (shown, expected) = (Shown::from_image(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
@@ -99,7 +99,7 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
 
     // Applies every condition of the tolerance, so that the reader sees all that differ.
     if let Some(limit) = &tolerance.flip {
-        checks.push(looks(limit, &shown, &expected)?);
+        checks.push(check_flip(limit, &shown, &expected)?);
     }
     if let Some(cap) = tolerance.bad_pixels {
         let far = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > BAD_DIFFERENCE);
@@ -111,7 +111,7 @@ pub fn judge(frame: &Frame, image: &Image, golden: &Golden) -> Result<Judgement>
     if let (Some(limit), Some(reference)) = (&tolerance.z_test, &golden.reference) {
         let test = ZTest { false_alarms: limit.false_alarms };
         let verdict = test.compare(&Estimate::from_image(image)?, reference)?;
-        checks.push(noise(limit, test.holds(&verdict), &verdict));
+        checks.push(check_noise(limit, test.holds(&verdict), &verdict));
     }
     Ok(Judgement { checks })
 }
@@ -138,7 +138,7 @@ fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
 }
 
 /// Bit for bit, every channel that the golden image has.
-fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
+fn check_exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
     let (mut differing, mut largest, mut worst) = (vec![false; image.pixel_count()], 0.0f64, String::new());
     if frame.format == GoldenFormat::Png {
         let (shown, expected) = (Shown::from_image(&shown_image(frame, image), golden)?, Shown::golden(frame, golden)?);
@@ -220,7 +220,7 @@ impl Shown {
 }
 
 /// A percentile of FLIP.
-fn looks(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
+fn check_flip(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
     let (a, b) = (shown.linear(), expected.linear());
     let flip = flip(&ImagePair::new(&a, &b, shown.channels, None)?, shown.width, PIXELS_PER_DEGREE)?;
     let errors: Vec<f64> = flip.map.iter().map(|e| f64::from(*e)).collect();
@@ -236,7 +236,7 @@ fn looks(limit: &FlipLimit, shown: &Shown, expected: &Shown) -> Result<Check> {
     ))
 }
 
-fn noise(limit: &ZTestLimit, holds: bool, verdict: &ZTestVerdict) -> Check {
+fn check_noise(limit: &ZTestLimit, holds: bool, verdict: &ZTestVerdict) -> Check {
     let percent = |x: f64| 100.0 * x;
     let bias = format!("bias {:+.3} % +- {:.3} %", percent(verdict.bias), percent(verdict.bias_error));
     let p = if verdict.p < 1e-3 { format!("{:.1e}", verdict.p) } else { format!("{:.3}", verdict.p) };

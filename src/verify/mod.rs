@@ -23,7 +23,7 @@ use golden::Golden;
 use judge::Judgement;
 use manifest::{Frame, Manifest, Tracers};
 use selection::Selection;
-use session::Session;
+use session::VerifySession;
 pub use text::plural;
 
 use crate::error::{Error, Result};
@@ -194,7 +194,7 @@ pub fn run(
         let (device, driver) = (String::new(), String::new());
         return Ok(Summary { device, driver, frames: results, seconds: start.elapsed().as_secs_f64() });
     }
-    let mut session = Session::open(manifest, device)?;
+    let mut session = VerifySession::open(manifest, device)?;
     if let Action::Bless { missing, force } = options.action {
         if missing {
             frames.retain(|f| !manifest.golden(f).exists());
@@ -242,7 +242,7 @@ enum Job {
 }
 
 /// All frames with their tracers; those of one scene with one tracer follow one another.
-fn jobs<'m>(session: &Session, frames: &[&'m Frame], options: &Options) -> Vec<(&'m Frame, Job)> {
+fn jobs<'m>(session: &VerifySession, frames: &[&'m Frame], options: &Options) -> Vec<(&'m Frame, Job)> {
     let driver = &session.info().driver;
     let mut jobs = Vec::new();
     for group in frames.chunk_by(|a, b| a.scene == b.scene) {
@@ -289,7 +289,7 @@ impl From<Outcome> for Done {
 }
 
 fn process_frame(
-    session: &mut Session,
+    session: &mut VerifySession,
     manifest: &Manifest,
     frame: &Frame,
     kind: TracerKind,

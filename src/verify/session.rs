@@ -17,7 +17,7 @@ use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
 const KEPT_PIPELINES: usize = 64;
 
 /// An open device, and the renderer of the last frame, which the next one reuses.
-pub struct Session<'m> {
+pub struct VerifySession<'m> {
     manifest: &'m Manifest,
     device: Arc<Device>,
     settings: DeviceSettings,
@@ -30,7 +30,7 @@ struct OpenRenderer {
     renderer: Renderer,
 }
 
-impl<'m> Session<'m> {
+impl<'m> VerifySession<'m> {
     pub fn open(manifest: &'m Manifest, settings: &DeviceSettings) -> Result<Self> {
         settings.check()?;
         let device = Device::open(&Options { keep_pipelines: KEPT_PIPELINES, ..settings.options() })?;

@@ -139,7 +139,7 @@ mod tests {
         let z = parse("\"z_test\"").unwrap();
         assert_eq!(z.z_test, Some(ZTestLimit { false_alarms: FALSE_ALARMS, bias: None }));
         assert_eq!(parse("{ z_test = {} }").unwrap(), z);
-        assert!(z.allows_other_seeds() && !of("\"exact\"").unwrap().allows_other_seeds());
+        assert!(z.allows_other_seeds() && !parse("\"exact\"").unwrap().allows_other_seeds());
         let both = parse("{ flip = { max = 0.05 }, bad_pixels = 3 }").unwrap();
         assert_eq!(both.flip, Some(FlipLimit { percentile: 99.0, max: 0.05 }));
         assert_eq!((both.bad_pixels, both.exact, both.z_test), (Some(3), false, None));
@@ -155,7 +155,7 @@ mod tests {
             ("{ bad_pixels = -1 }", "-1"),
             ("3", "expected"),
         ] {
-            let error = of(text).unwrap_err();
+            let error = parse(text).unwrap_err();
             assert!(error.contains(says), "{text}: {error}");
         }
     }

@@ -30,10 +30,10 @@ fn rays_or_quarter(full: usize) -> usize {
 /// Every tracer against the oracle without its tree; also makes a small image and its outputs, which must be numbers.
 fn judge(device: &Arc<Device>, what: &str, scene: &Scene, rays: &[Ray]) {
     let oracle = Oracle::new(scene, scene.origin());
-    let truth = degenerate::truth(&oracle, rays);
+    let truth = degenerate::trace_oracle(&oracle, rays);
     let judged = |what: &str, tracer: &Tracer| {
-        let [closest, any] =
-            degenerate::judge(tracer, &oracle, rays, &truth, &mut NoControl).unwrap_or_else(|e| panic!("{what}: {e}"));
+        let [closest, any] = degenerate::compare_hits(tracer, &oracle, rays, &truth, &mut NoControl)
+            .unwrap_or_else(|e| panic!("{what}: {e}"));
         println!("{what}: {closest}; stack of {}", tracer.stats().stack_entries);
         assert_eq!(closest.unexplained, 0, "{what}: {closest}");
         assert_eq!(any.unexplained, 0, "{what} any: {any}");

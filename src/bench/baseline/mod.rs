@@ -225,14 +225,22 @@ mod tests {
     }
 
     /// Repeats around a median that differ by a few per cent.
-    fn around(median: f64) -> Vec<f64> {
+    fn repeats_around(median: f64) -> Vec<f64> {
         [0.98, 1.03, 1.0, 0.99, 1.02, 1.0, 0.97, 1.01].map(|k| k * median).into()
     }
 
     #[test]
     fn a_slowdown_is_found_and_noise_is_not() {
-        let before = baseline(vec![result("a", &around(10.0)), result("b", &around(5.0)), result("c", &around(1.0))]);
-        let now = run(vec![result("a", &around(10.2)), result("b", &around(6.0)), result("c", &around(0.8))]);
+        let before = baseline(vec![
+            result("a", &repeats_around(10.0)),
+            result("b", &repeats_around(5.0)),
+            result("c", &repeats_around(1.0)),
+        ]);
+        let now = run(vec![
+            result("a", &repeats_around(10.2)),
+            result("b", &repeats_around(6.0)),
+            result("c", &repeats_around(0.8)),
+        ]);
         let report = before.compare(&now);
         assert_eq!((report.compared, report.regressions.len(), report.improvements.len()), (3, 1, 1));
         let worst = &report.regressions[0];
@@ -250,22 +258,22 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_named() {
-        let report = baseline(vec![result("a", &around(1.0)), result("b", &around(1.0))])
-            .compare(&run(vec![result("b", &around(1.0)), result("c", &around(1.0))]));
+        let report = baseline(vec![result("a", &repeats_around(1.0)), result("b", &repeats_around(1.0))])
+            .compare(&run(vec![result("b", &repeats_around(1.0)), result("c", &repeats_around(1.0))]));
         assert_eq!((report.missing.as_slice(), report.new, report.compared), (&["a: ms".to_owned()][..], 1, 1));
         assert!(crate::bench::table::lines(&report.parts()).iter().any(|l| l.trim() == "a: ms"));
     }
 
     #[test]
     fn another_programs_results_do_not_fail_a_run() {
-        let theirs = |median| Measurement { is_peers: true, ..result("peer", &around(median)) };
+        let theirs = |median| Measurement { is_peers: true, ..result("peer", &repeats_around(median)) };
         let report = baseline(vec![theirs(1.0)]).compare(&run(vec![theirs(2.0)]));
         assert!(report.verdict().is_ok() && report.worse_peers.len() == 1);
     }
 
     #[test]
     fn another_machine_is_a_warning_and_other_settings_an_error() {
-        let before = baseline(vec![result("a", &around(1.0))]);
+        let before = baseline(vec![result("a", &repeats_around(1.0))]);
         let mut now = run(Vec::new());
         now.host.cpu = "y".into();
         let warnings = before.compare(&now).warnings;

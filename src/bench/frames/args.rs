@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum, ValueHint};
 
 use super::candidates::{CANDIDATES, Candidate};
 use crate::bench::common::CommonArgs;
-use crate::bench::session::Session;
+use crate::bench::session::BenchSession;
 use crate::error::{Error, Result};
 use crate::integrators::{self, IntegratorName};
 use crate::output::parse_size;
@@ -163,7 +163,7 @@ pub struct BenchFramesArgs {
 }
 
 /// A run of `skylit bench frames`.
-pub type FramesSession<'a> = Session<'a, BenchFramesArgs>;
+pub type FramesSession<'a> = BenchSession<'a, BenchFramesArgs>;
 
 fn candidate_names() -> clap::builder::PossibleValuesParser {
     CANDIDATES.iter().map(|c| c.name).collect::<Vec<_>>().into()

@@ -4,8 +4,8 @@ use super::args::FramesSession;
 use super::candidates::Candidate;
 use super::frame_log::{FrameLog, first_timed};
 use super::larsen::OURS;
-use super::scenes::{FramesScene, View};
-use super::stage::Stage;
+use super::scenes::{CameraView, FramesScene};
+use super::stage::SceneStage;
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{plain, quantity};
 use crate::error::Result;
@@ -66,12 +66,12 @@ fn measure_scene(session: &mut FramesSession, published: &PublishedScene, candid
     scene.environment = Environment::Uniform(glam::Vec3::ONE);
     let camera = camera::choose(&scene, &Choice::Auto, args.aspect())?;
     let name = published.source.to_owned();
-    let view = View { name: name.clone(), middle: camera.camera_to_world.translation, camera };
+    let view = CameraView { name: name.clone(), middle: camera.camera_to_world.translation, camera };
     let light = "white".into();
     let loaded = FramesScene { name, scene, views: vec![view], light, reach: f64::INFINITY, mover: None };
     let flat = FlatScene::for_paths(&loaded.scene);
     for (bounces, fps) in (1..).zip(published.fps) {
-        let stage = Stage::new(session, (&loaded, &loaded.views[0]), &flat, args.size(), Some(bounces), None)?;
+        let stage = SceneStage::new(session, (&loaded, &loaded.views[0]), &flat, args.size(), Some(bounces), None)?;
         // frames at rest take as many paths as those in motion
         let settings = Settings { converge: false, ..stage.settings(candidate)? };
         let mut realtime = stage.realtime_with(candidate, settings)?;

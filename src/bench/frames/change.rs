@@ -6,9 +6,9 @@ use glam::DVec3;
 use super::args::FramesSession;
 use super::candidates::Candidate;
 use super::frame_log::FrameLog;
-use super::scenes::View;
+use super::scenes::CameraView;
 use super::signal::EqualTime;
-use super::stage::{Stage, turned};
+use super::stage::{SceneStage, turned};
 use crate::bench::record::{Better, Quantity, REFERENCE, plain, quantity};
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
@@ -64,7 +64,12 @@ struct ChangeRun {
 }
 
 /// Measures all changes that the scene can have.
-pub fn measure(session: &mut FramesSession, view: &View, stage: &mut Stage, mover: Option<Mover>) -> Result<()> {
+pub fn measure(
+    session: &mut FramesSession,
+    view: &CameraView,
+    stage: &mut SceneStage,
+    mover: Option<Mover>,
+) -> Result<()> {
     if let Some(map) = stage.map() {
         turn(session, &view.name, stage, map)?;
     }
@@ -75,7 +80,7 @@ pub fn measure(session: &mut FramesSession, view: &View, stage: &mut Stage, move
 }
 
 /// The environment map is turned at once.
-fn turn(session: &mut FramesSession, scene: &str, stage: &mut Stage, map: &EnvironmentMap) -> Result<()> {
+fn turn(session: &mut FramesSession, scene: &str, stage: &mut SceneStage, map: &EnvironmentMap) -> Result<()> {
     session.phase(format!("{scene}, turn: references"));
     let (camera, paths) = (stage.still_camera(), session.args.reference_paths());
     let after = turned(map, TURN);
@@ -92,7 +97,7 @@ fn turn(session: &mut FramesSession, scene: &str, stage: &mut Stage, map: &Envir
 }
 
 /// A box appears.
-fn appear(session: &mut FramesSession, scene: &str, stage: &mut Stage, mover: Mover) -> Result<()> {
+fn appear(session: &mut FramesSession, scene: &str, stage: &mut SceneStage, mover: Mover) -> Result<()> {
     session.phase(format!("{scene}, appear: references"));
     let (camera, paths) = (stage.still_camera(), session.args.reference_paths());
     stage.place(mover.away())?;
@@ -111,7 +116,7 @@ fn appear(session: &mut FramesSession, scene: &str, stage: &mut Stage, mover: Mo
 }
 
 /// The camera steps aside, once; nothing where that shows nothing new.
-fn sidestep(session: &mut FramesSession, view: &View, stage: &mut Stage) -> Result<()> {
+fn sidestep(session: &mut FramesSession, view: &CameraView, stage: &mut SceneStage) -> Result<()> {
     let scene = &view.name;
     session.phase(format!("{scene}, sidestep: reference"));
     let from = stage.still_camera();
@@ -134,9 +139,9 @@ fn sidestep(session: &mut FramesSession, view: &View, stage: &mut Stage) -> Resu
 fn measure_presets(
     session: &mut FramesSession,
     scene: &str,
-    stage: &mut Stage,
+    stage: &mut SceneStage,
     change: &ChangeScene,
-    mut apply: impl FnMut(&mut Realtime, &mut Stage, bool) -> Result<(Vec<MovedBounds>, Option<f64>)>,
+    mut apply: impl FnMut(&mut Realtime, &mut SceneStage, bool) -> Result<(Vec<MovedBounds>, Option<f64>)>,
 ) -> Result<()> {
     let part = change.part;
     let mut runs = Vec::new();
@@ -175,10 +180,10 @@ fn measure_presets(
 fn measure_preset(
     session: &mut FramesSession,
     scene: &str,
-    stage: &mut Stage,
+    stage: &mut SceneStage,
     change: &ChangeScene,
     candidate: &'static Candidate,
-    apply: &mut impl FnMut(&mut Realtime, &mut Stage, bool) -> Result<(Vec<MovedBounds>, Option<f64>)>,
+    apply: &mut impl FnMut(&mut Realtime, &mut SceneStage, bool) -> Result<(Vec<MovedBounds>, Option<f64>)>,
 ) -> Result<ChangeRun> {
     // frames before the change, and after it
     let frames = (session.args.frames() * 2 / 3).max(MIN_FRAMES);

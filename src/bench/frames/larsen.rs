@@ -2,7 +2,7 @@
 
 use super::candidates::Candidate;
 use super::frame_log::{FrameLog, first_timed};
-use super::stage::Stage;
+use super::stage::SceneStage;
 use super::still::{StillResult, yes_or_no};
 use crate::bench::record::{Record, plain, quantity};
 use crate::error::Result;
@@ -64,7 +64,7 @@ pub fn remarks(results: &[StillResult]) -> Vec<String> {
 pub fn measure_equal_time(
     record: &mut Record,
     scene: &str,
-    stage: &Stage,
+    stage: &SceneStage,
     results: &[StillResult],
     reference: &FrameReference,
     frames: u32,

@@ -23,7 +23,7 @@ use args::{FalloffChoice, FramesSession, Part};
 
 use super::peers::file::{self, Measures, PeerSpec};
 use super::record::{BenchKind, Record};
-use super::session::Session;
+use super::session::BenchSession;
 use crate::error::Result;
 use crate::terminal::console::Failure;
 
@@ -34,7 +34,7 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     let specs = if args.wants_peers() { file::choose(args.peers.as_deref(), Measures::Paths)? } else { Ok(Vec::new()) };
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
     args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| {
+    let mut session = BenchSession::start(args, &args.common, |device| {
         let [width, height] = args.size();
         let falloff = if args.ao_falloff == FalloffChoice::Binary { "binary" } else { "exponential" };
         let mut settings = vec![

@@ -5,7 +5,7 @@ use super::candidates::Candidate;
 use super::change::add_ghost;
 use super::frame_log::{FrameLog, first_timed, measured};
 use super::signal::EqualTime;
-use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, Stage};
+use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, SceneStage};
 use super::still::plain_remark;
 use crate::bench::record::{REFERENCE, plain, quantity};
 use crate::error::Result;
@@ -24,7 +24,7 @@ struct Moment {
 }
 
 /// Measures all presets.
-pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut motion: Motion) -> Result<()> {
+pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut SceneStage, mut motion: Motion) -> Result<()> {
     let (part, paths) = (motion.name(), session.args.moving_reference_paths());
     session.phase(format!("{scene}, {part}: references"));
     let mut moments = Vec::new();
@@ -64,7 +64,7 @@ pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut Stage, mut 
 fn measure_preset(
     session: &mut FramesSession,
     scene: &str,
-    stage: &mut Stage,
+    stage: &mut SceneStage,
     motion: &mut Motion,
     candidate: &Candidate,
     moments: &[Moment],

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::args::FramesSession;
-use super::scenes::{FramesScene, View};
+use super::scenes::{CameraView, FramesScene};
 use super::stage::{PlainImage, REFERENCE_SEEDS, TIMED_IMAGES};
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::bench::record::{FRAME, plain, quantity};
@@ -41,7 +41,7 @@ const TRIES: usize = 3;
 const NEAR: f64 = 0.05;
 
 /// Gives all peers a scene, and takes references and times. Those that fail are left out.
-pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &View) -> Result<Vec<PeerImages>> {
+pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &CameraView) -> Result<Vec<PeerImages>> {
     let mut images = Vec::new();
     for peer in 0..session.peers.len() {
         let name = session.peers[peer].spec.name.clone();
@@ -95,7 +95,7 @@ fn leave_out(session: &mut FramesSession, what: &str, e: PeerError) -> Result<()
 
 fn prepare_peer(
     session: &mut FramesSession,
-    (loaded, view): (&FramesScene, &View),
+    (loaded, view): (&FramesScene, &CameraView),
     k: usize,
 ) -> Result<Vec<PeerImages>, PeerError> {
     let (size, seed, paths) = (session.args.size(), session.args.seed, session.args.reference_paths());

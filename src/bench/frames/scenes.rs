@@ -54,7 +54,7 @@ pub struct FramesScene {
     pub name: String,
     pub scene: Scene,
     /// The camera.
-    pub views: Vec<View>,
+    pub views: Vec<CameraView>,
     /// The lights, in words.
     pub light: String,
     /// How far ambient occlusion reaches, scene units.
@@ -63,7 +63,7 @@ pub struct FramesScene {
     pub mover: Option<Mover>,
 }
 
-pub struct View {
+pub struct CameraView {
     /// In tables, the name of the scene included.
     pub name: String,
     pub camera: Camera,
@@ -128,7 +128,7 @@ pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
         };
         let has_several = args.views().len() > 1;
         let name = if has_several { format!("{name}, {}", choice.name()) } else { name.clone() };
-        views.push(View { name, camera, middle });
+        views.push(CameraView { name, camera, middle });
     }
     let reach = if mover.is_some() { moving_box::REACH } else { known.map_or(REACH * (hi - lo).length(), |k| k.reach) };
     Ok(FramesScene { name, scene, views, light, reach, mover })

@@ -5,7 +5,7 @@ use super::candidates::Candidate;
 use super::frame_log::first_timed;
 use super::larsen::{OURS, THEIRS};
 use super::scenes;
-use super::stage::Stage;
+use super::stage::SceneStage;
 use super::still::{self, StillRun, points};
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{FRAME, SIZE, plain, quantity};
@@ -63,7 +63,7 @@ pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -
                 continue;
             }
             session.phase(name);
-            let mut stage = Stage::new(session, (&loaded, view), &flat, size, None, None)?;
+            let mut stage = SceneStage::new(session, (&loaded, view), &flat, size, None, None)?;
             match series {
                 Series::Triangles => {
                     measure_size(session, &view.name, &stage, (SIZE, loaded.primitives() as f64), &[OURS, THEIRS])?;
@@ -85,7 +85,7 @@ pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -
 fn measure_size(
     session: &mut FramesSession,
     scene: &str,
-    stage: &Stage,
+    stage: &SceneStage,
     (axis, value): (&str, f64),
     presets: &[&str],
 ) -> Result<()> {
@@ -102,7 +102,7 @@ fn measure_size(
 }
 
 /// Time and error by the number of rays, or paths, per pixel.
-fn measure_rays(session: &mut FramesSession, scene: &str, stage: &mut Stage) -> Result<()> {
+fn measure_rays(session: &mut FramesSession, scene: &str, stage: &mut SceneStage) -> Result<()> {
     let numbers: &[u32] = if session.args.common.quick { &QUICK_RAYS } else { &RAYS };
     let frames = session.args.frames();
     let Some(candidate) = Candidate::find(OURS) else { return Ok(()) };
@@ -128,7 +128,7 @@ fn measure_rays(session: &mut FramesSession, scene: &str, stage: &mut Stage) -> 
 }
 
 /// Error of every sequence of samples: by frames, and when the quickest of them is done.
-fn measure_sequences(session: &mut FramesSession, scene: &str, stage: &mut Stage) -> Result<()> {
+fn measure_sequences(session: &mut FramesSession, scene: &str, stage: &mut SceneStage) -> Result<()> {
     let frames = session.args.frames();
     let Some(candidate) = Candidate::find(OURS) else { return Ok(()) };
     let reference = stage.reference(&stage.still_camera(), session.args.reference_paths())?;

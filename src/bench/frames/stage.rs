@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat3};
 use super::args::FramesSession;
 use super::candidates::Candidate;
 use super::frame_log::FrameLog;
-use super::scenes::{FramesScene, View};
+use super::scenes::{CameraView, FramesScene};
 use super::signal::{EqualTime, Sampler, Signal};
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{Row, plain, quantity};
@@ -123,7 +123,7 @@ impl FrameInputs {
     }
 }
 
-pub struct Stage<'a> {
+pub struct SceneStage<'a> {
     pub tracer: Tracer,
     pub flat: &'a FlatScene<'a>,
     pub camera: &'a Camera,
@@ -139,11 +139,11 @@ pub struct Stage<'a> {
     oidn: Option<&'a Oidn>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> SceneStage<'a> {
     /// Builds the tracer for images of this size, and finds out how long a path takes.
     pub fn new(
         session: &FramesSession,
-        (loaded, view): (&FramesScene, &'a View),
+        (loaded, view): (&FramesScene, &'a CameraView),
         flat: &'a FlatScene<'a>,
         size: [u32; 2],
         bounces: Option<u32>,

@@ -5,7 +5,7 @@ use super::candidates::Candidate;
 use super::frame_log::{FrameCost, FrameLog, first_timed};
 use super::peers::{self, PeerImages};
 use super::signal::EqualTime;
-use super::stage::{PlainImage, Stage};
+use super::stage::{PlainImage, SceneStage};
 use crate::bench::record::{FRAME, plain, quantity};
 use crate::error::Result;
 use crate::measure::displayed::{Flicker, FlickerMeter, FrameReference, ImageErrors};
@@ -58,7 +58,7 @@ pub struct StillRun {
 pub fn measure(
     session: &mut FramesSession,
     scene: &str,
-    stage: &mut Stage,
+    stage: &mut SceneStage,
     candidate: &'static Candidate,
     reference: &FrameReference,
     beside: &mut Vec<PeerImages>,
@@ -173,7 +173,7 @@ pub fn points(frames: u32) -> impl Iterator<Item = u32> {
 
 /// Frames of a still camera, from the first. `clock`: plain accumulation is timed beside them.
 pub fn run(
-    stage: &mut Stage,
+    stage: &mut SceneStage,
     candidate: &Candidate,
     settings: Settings,
     reference: &FrameReference,
@@ -223,7 +223,7 @@ pub fn run(
 pub fn measure_rest(
     session: &mut FramesSession,
     scene: &str,
-    stage: &Stage,
+    stage: &SceneStage,
     candidate: &Candidate,
     reference: &FrameReference,
 ) -> Result<()> {

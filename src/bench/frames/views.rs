@@ -2,8 +2,8 @@
 
 use super::args::{FramesSession, Part};
 use super::frame_log::FRAMES_PER_TURN;
-use super::scenes::{self, FramesScene, View};
-use super::stage::{Motion, Stage};
+use super::scenes::{self, CameraView, FramesScene};
+use super::stage::{Motion, SceneStage};
 use super::{change, larsen, moving, peers, still};
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::{REFERENCE, plain, quantity};
@@ -36,7 +36,7 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
     let scene = &loaded.scene;
     let has_animation = scene.rig.as_ref().is_some_and(|rig: &AnimationRig| !rig.animations().is_empty());
     let animation = (has_animation && args.wants(Part::Animation)).then_some(0);
-    let sequence = |view: &View| {
+    let sequence = |view: &CameraView| {
         FrameSequence::new(scene, view.camera.clone(), None, CameraMotion::Still, animation, FRAMES_PER_SECOND)
     };
     let motion = match loaded.mover {
@@ -51,7 +51,7 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
             continue;
         }
         session.phase(format!("{}: building", view.name));
-        let mut stage = Stage::new(session, (&loaded, view), &flat, args.size(), None, oidn)?;
+        let mut stage = SceneStage::new(session, (&loaded, view), &flat, args.size(), None, oidn)?;
         let sequence = animation.map(|_| sequence(view)).transpose()?;
         let views = loaded.views.len() as f64;
         let outcome = fill(session, (&loaded, view), &mut stage, sequence, [k, k + 1].map(|k| k as f64 / views));
@@ -64,7 +64,7 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
 }
 
 /// Says what a view is of, if anything was measured of it.
-fn describe(session: &mut FramesSession, loaded: &FramesScene, view: &View, stage: &Stage) {
+fn describe(session: &mut FramesSession, loaded: &FramesScene, view: &CameraView, stage: &SceneStage) {
     if !session.record.measurements.iter().any(|m| m.scene == view.name) {
         return;
     }
@@ -78,8 +78,8 @@ fn describe(session: &mut FramesSession, loaded: &FramesScene, view: &View, stag
 
 fn fill<'a>(
     session: &mut FramesSession,
-    (loaded, view): (&'a FramesScene, &'a View),
-    stage: &mut Stage<'a>,
+    (loaded, view): (&'a FramesScene, &'a CameraView),
+    stage: &mut SceneStage<'a>,
     sequence: Option<FrameSequence<'a>>,
     [from, to]: [f64; 2],
 ) -> Result<()> {
@@ -118,7 +118,11 @@ fn fill<'a>(
 }
 
 /// Everything about a camera that stands still.
-fn measure_still(session: &mut FramesSession, (loaded, view): (&FramesScene, &View), stage: &mut Stage) -> Result<()> {
+fn measure_still(
+    session: &mut FramesSession,
+    (loaded, view): (&FramesScene, &CameraView),
+    stage: &mut SceneStage,
+) -> Result<()> {
     // the reference
     let (args, scene) = (session.args, view.name.as_str());
     session.phase(format!("{scene}: reference"));

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 
 use crate::bench::common::CommonArgs;
-use crate::bench::session::Session;
+use crate::bench::session::BenchSession;
 use crate::integrators::path::Strategy;
 use crate::output::parse_size;
 use crate::settings::parse::parse_seconds;
@@ -72,7 +72,7 @@ pub struct BenchPathArgs {
 }
 
 /// A run of `skylit bench path`.
-pub type PathSession<'a> = Session<'a, BenchPathArgs>;
+pub type PathSession<'a> = BenchSession<'a, BenchPathArgs>;
 
 impl BenchPathArgs {
     /// Image size, pixels.

@@ -19,7 +19,7 @@ use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
 use super::record::{BenchKind, REFERENCE, Record, plain, quantity};
 use super::scenes::table_name;
-use super::session::Session;
+use super::session::BenchSession;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::SampleSettings;
@@ -45,7 +45,7 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     let specs = file::choose(args.peers.as_deref(), Measures::Paths)?;
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
     args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| Record {
+    let mut session = BenchSession::start(args, &args.common, |device| Record {
         benchmark: BenchKind::Path,
         host: device.host_info(),
         settings: [

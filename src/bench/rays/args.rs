@@ -5,7 +5,7 @@ use clap::{Args, ValueHint};
 use super::contestant::KERNELS;
 use super::streams::STREAMS;
 use crate::bench::common::CommonArgs;
-use crate::bench::session::Session;
+use crate::bench::session::BenchSession;
 use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::BuildChoice;
@@ -69,7 +69,7 @@ pub struct BenchRaysArgs {
 }
 
 /// A run of `skylit bench rays`.
-pub type RaySession<'a> = Session<'a, BenchRaysArgs>;
+pub type RaySession<'a> = BenchSession<'a, BenchRaysArgs>;
 
 fn kernel_names() -> clap::builder::PossibleValuesParser {
     KERNELS.iter().map(|o| o.name).collect::<Vec<_>>().into()

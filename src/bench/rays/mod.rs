@@ -22,7 +22,7 @@ use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
 use super::record::{BenchKind, Record, SIZE, plain, quantity};
 use super::scenes::check_exists;
-use super::session::Session;
+use super::session::BenchSession;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::integrators::ray_sets::{RaySet, RaySets};
@@ -71,7 +71,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let specs = file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
     args.common.check_inputs(&scenes.sources, None, args.peers.as_deref())?;
-    let mut session = Session::start(args, &args.common, |device| Record {
+    let mut session = BenchSession::start(args, &args.common, |device| Record {
         benchmark: BenchKind::Rays,
         host: device.host_info(),
         settings: [
@@ -420,7 +420,7 @@ impl RaySession<'_> {
                 continue;
             }
             let rays = sets.get(stream.set);
-            let ours = sure(reference.hits(&mut self.peers, rays, stream.mode, &mut self.control))?;
+            let ours = into_own_result(reference.hits(&mut self.peers, rays, stream.mode, &mut self.control))?;
             for (k, contestant) in contestants.iter().enumerate() {
                 if k == first || failed[k] || !contestant.is_for(stream.set) {
                     continue;
@@ -458,7 +458,7 @@ impl RaySession<'_> {
 }
 
 /// Our own contestants fail with errors of ours only.
-fn sure<T>(result: Result<T, PeerError>) -> Result<T> {
+fn into_own_result<T>(result: Result<T, PeerError>) -> Result<T> {
     result.map_err(|e| match e {
         PeerError::Ours(e) => e,
         PeerError::Failed(why) => Error::CheckFailed(why),

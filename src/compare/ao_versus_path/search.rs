@@ -89,7 +89,7 @@ struct Searcher<'a> {
 
 impl Searcher<'_> {
     /// One radius and falloff, over all pixels.
-    fn exact(&self, log2: f64, radius: f64, log_error: Option<f64>) -> Choice {
+    fn evaluate(&self, log2: f64, radius: f64, log_error: Option<f64>) -> Choice {
         let sums = Table::evaluate(self.samples, self.target, &[log2], &[radius]).sums(0, 0, None);
         let mse = (self.target.energy() - sums.explained()) / self.target.values().max(1.0);
         Choice { attenuation: Attenuation { radius, falloff: log2.exp2() }, ambient: sums.ambient(), mse, log_error }
@@ -100,14 +100,14 @@ impl Searcher<'_> {
         let explained: Vec<f64> = (0..=last).map(|r| coarse.sums(0, r, None).explained()).collect();
         let best = greatest(&explained);
         if best == last {
-            return self.exact(0.0, f64::INFINITY, None);
+            return self.evaluate(0.0, f64::INFINITY, None);
         }
-        let radii = around(coarse.radii[best], 0.5, FINE);
+        let radii = grid_around(coarse.radii[best], 0.5, FINE);
         let fine = Table::evaluate(self.samples, self.target, &[0.0], &radii);
         let at = |without| peak(&(0..radii.len()).map(|r| fine.sums(0, r, without).explained()).collect::<Vec<_>>());
         let (position, log_error) = jackknife(at, FINE);
         let is_inside = best > 0 || position > 0.0;
-        self.exact(0.0, interpolated(&radii, position), is_inside.then_some(log_error))
+        self.evaluate(0.0, interpolated(&radii, position), is_inside.then_some(log_error))
     }
 
     fn falloff(&self, coarse: &Table) -> Choice {
@@ -116,7 +116,7 @@ impl Searcher<'_> {
             (1..coarse.falloffs.len()).map(|f| coarse.sums(f, unlimited, None).explained()).collect();
         let best = greatest(&explained);
         let half = 1.0 / coarse.falloffs[1 + best];
-        let halves = around(half, 1.0, FINE_FALLOFFS);
+        let halves = grid_around(half, 1.0, FINE_FALLOFFS);
         let falloffs: Vec<f64> = halves.iter().map(|half| (1.0 / half).min(MAX_LOG2)).collect();
         let fine = Table::evaluate(self.samples, self.thinned, &falloffs, &[f64::INFINITY]);
         let at = |without| peak(&(0..falloffs.len()).map(|f| fine.sums(f, 0, without).explained()).collect::<Vec<_>>());
@@ -124,7 +124,7 @@ impl Searcher<'_> {
         let is_inside =
             (best > 0 || position > 0.0) && (best + 1 < explained.len() || position < (halves.len() - 1) as f64);
         let log_error = is_inside.then_some(log_error);
-        self.exact((1.0 / interpolated(&halves, position)).min(MAX_LOG2), f64::INFINITY, log_error)
+        self.evaluate((1.0 / interpolated(&halves, position)).min(MAX_LOG2), f64::INFINITY, log_error)
     }
 
     /// `others`: what one parameter alone reaches, which two cannot fall short of.
@@ -143,15 +143,17 @@ impl Searcher<'_> {
             best
         };
         let (f, r, _) = pairs(coarse);
-        let falloffs: Vec<f64> =
-            around(1.0 / coarse.falloffs[f], 1.0, FINE_BOTH).iter().map(|half| (1.0 / half).min(MAX_LOG2)).collect();
+        let falloffs: Vec<f64> = grid_around(1.0 / coarse.falloffs[f], 1.0, FINE_BOTH)
+            .iter()
+            .map(|half| (1.0 / half).min(MAX_LOG2))
+            .collect();
         // of an infinite radius the finite ones next to it are the largest
         let finite = coarse.radii[r.min(coarse.radii.len() - 2)];
-        let mut radii = around(finite, 1.0, FINE_BOTH);
+        let mut radii = grid_around(finite, 1.0, FINE_BOTH);
         radii.push(f64::INFINITY);
         let fine = Table::evaluate(self.samples, self.thinned, &falloffs, &radii);
         let (f, r, _) = pairs(&fine);
-        let found = self.exact(fine.falloffs[f], fine.radii[r], None);
+        let found = self.evaluate(fine.falloffs[f], fine.radii[r], None);
         others.iter().fold(found, |best, other| if other.mse <= best.mse { *other } else { best })
     }
 
@@ -175,7 +177,7 @@ fn geometric(from: f64, to: f64, per_octave: f64) -> Vec<f64> {
 }
 
 /// Numbers about another, `octaves` to each side.
-fn around(middle: f64, octaves: f64, per_octave: f64) -> Vec<f64> {
+fn grid_around(middle: f64, octaves: f64, per_octave: f64) -> Vec<f64> {
     geometric(middle * (-octaves).exp2(), middle * octaves.exp2(), per_octave)
 }
 
