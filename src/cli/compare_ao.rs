@@ -216,6 +216,8 @@ fn lines(report: &Report, seconds: f64) -> Vec<String> {
             percent(light.bounces)
         ),
     ];
+
+    // what was found, and commands that show it
     lines.extend(report.choices.iter().cloned());
     for fit in report.path.iter().chain(&report.sky) {
         lines.push(String::new());
@@ -262,6 +264,7 @@ fn fit_lines(fit: &FitRecord) -> Vec<String> {
         interval(fit.good_radii)
     ));
     lines.push(format!("  best falloff {}", choice_text(&fit.falloff)));
+
     // none of a sum that noise makes negative
     if let Some((parts, all)) =
         fit.parts.as_ref().map(|p| (p, p.transport + p.occlusion + p.cross)).filter(|p| p.1 > 0.0)
@@ -274,6 +277,8 @@ fn fit_lines(fit: &FitRecord) -> Vec<String> {
             share(parts.cross)
         ));
     }
+
+    // the best image by other metrics
     let m = &fit.metrics;
     lines.push(format!(
         "  the best image: FLIP {:.4}, Tanimoto {:.4}, minimum ratio {:.4}, bias {:+.2e}",

@@ -97,6 +97,8 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
+
+    // what the file has
     let inventory = Inventory::from_scene(&scene);
     let format = format_of(&args.scene);
     let extensions = scene.report.extensions.clone();
@@ -111,6 +113,8 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         "tangents_computed": scene.report.tangents_computed,
         "inventory": inventory,
     });
+
+    // what a render of it would be like
     if !args.no_device {
         let mut progress = Progress::new("looking at the scene", &console);
         match on_device(args, scene, &mut progress) {

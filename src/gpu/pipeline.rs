@@ -448,6 +448,8 @@ impl Table {
         let handles =
             unsafe { functions.get_ray_tracing_shader_group_handles(pipeline.raw, 0, groups, size * groups as usize) }
                 .context("the shader group handles")?;
+
+        // a region for each kind of shader
         let base = limits.shader_group_base_alignment as u64;
         let stride = (size as u64).next_multiple_of(limits.shader_group_handle_alignment as u64);
         let regions = [1u64, 1, groups as u64 - 2];
@@ -464,6 +466,8 @@ impl Table {
         let mut offset = start - table.address();
         let mut addresses = [0; 3];
         let mut handle = 0;
+
+        // handles at the strides that the device wants
         let table_address = table.address();
         let bytes = table.bytes_mut().ok_or_else(|| Error::Vulkan("the shader binding table is not mapped".into()))?;
         for (k, n) in regions.into_iter().enumerate() {

@@ -332,6 +332,7 @@ impl ZTest {
         let (tiles, _) = of_regions(Scale::Tile, &Region::tiles(known.size, TILE), &reference.tiles);
         let (mean, errors) = of_regions(Scale::Mean, &[Region::whole(known.size)], &reference.whole);
 
+        // the verdict is that of the most extreme, and of bias also what would have been found
         let extremes = [pixels, tiles, mean];
         let least = extremes.iter().map(|e| e.p).fold(1.0, f64::min);
         let share = |x: f64| if mean.reference == 0.0 { 0.0 } else { x / mean.reference.abs() };

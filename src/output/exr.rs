@@ -137,6 +137,8 @@ fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()
     {
         channels.extend(rgb.iter().map(|name| stored(name, &grey.samples)));
     }
+
+    // metadata, of which two keys are attributes of the format
     let software = text(concat!("skylit ", env!("CARGO_PKG_VERSION")));
     let mut attributes = LayerAttributes { software_name: Some(software), ..Default::default() };
     for (key, value) in &image.metadata {
@@ -146,6 +148,7 @@ fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()
             _ => drop(attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)))),
         }
     }
+
     // blocks in order of their rows, whichever thread finishes first: the bytes are always the same
     let encoding = Encoding {
         compression: options.compression.into(),
@@ -162,6 +165,8 @@ fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()
         blue: Vec2(0.15, 0.06),
         white: Vec2(0.3127, 0.329),
     });
+
+    // written through a buffer
     let mut out = BufWriter::with_capacity(1 << 18, file);
     file_image.write().to_buffered(&mut out).map_err(|e| match e {
         exr::error::Error::Io(e) => e,

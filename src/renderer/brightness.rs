@@ -43,6 +43,8 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
             _ => None,
         };
     }
+
+    // visibility, which exposure does not help
     if !can(AmbientOcclusion) && !can(WhiteSky) {
         return None;
     }

@@ -591,6 +591,8 @@ impl FramesReport {
         let passes: Map<_, _> = passes
             .map(|(label, median, p95)| (label.to_owned(), json!({ "median_ms": median, "p95_ms": p95 })))
             .collect();
+
+        // what frames have, beside what all renders have
         let own = json!({
             "integrator": self.integrator,
             "preset": self.preset,

@@ -64,6 +64,8 @@ fn run(session: &mut StressSession) -> Result<()> {
         let (a, b) = (ao(s, kind, w)?, ao(s, kind, w)?);
         Ok(Check::at_most(name, different_bits(&a, &b) as f64, "pixels", 0.0).says(format!("of {} differ", a.len())))
     })?;
+
+    // paths, and what does not depend on tiles
     let name = "paths, two runs";
     let shading = session.setup().shading_tracers();
     session.measure_each(name, &shading, |s, kind, w| {
@@ -78,6 +80,8 @@ fn run(session: &mut StressSession) -> Result<()> {
     })?;
     let name = "tiles that show nothing, left out";
     session.measure_each(name, &kinds, |s, kind, w| masked_tiles(s, kind, name, &stairs, w))?;
+
+    // tracers among one another
     if let [first, others @ ..] = &kinds[..] {
         for kind in others {
             let name = format!("{kind} against {first}");

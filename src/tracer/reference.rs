@@ -47,6 +47,7 @@ impl Trees {
         // every node visit pushes at most one entry, entering a TLAS instance the way back
         let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 1) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 1);
+
         // the top level first: it is visited by every ray
         let mut bases = Vec::new();
         let (mut node, mut primitive) = (self.top.as_ref().map_or(0, |t| t.nodes.len() as u32), 0);
@@ -63,6 +64,8 @@ impl Trees {
         let top_nodes = self.top.iter().flat_map(|t| padded(t, |c| top_reference(t, c)));
         let group_nodes =
             self.groups.iter().zip(bases).flat_map(|(t, b)| padded(t, move |c| bvh2::rebase(c, b.0, b.1)));
+
+        // into device memory
         let nodes = write_records(device, "hierarchy nodes", node as u64, &mut top_nodes.chain(group_nodes))?;
         let mut records = self
             .groups

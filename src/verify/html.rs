@@ -33,6 +33,8 @@ pub fn write(summary: &Summary, frames: &[Frame], folder: &Path, command: &str, 
         table = table.row(Row::new([name, tracer.into(), verdict, result.seconds.into(), text.as_str().into()]));
     }
     sections[0] = Section::new("All frames", vec![Part::Table(table)]);
+
+    // the page, which says in a sentence how it went
     let differ = summary.count(|o| matches!(o, Outcome::Differs(_)));
     let failed = summary.count(|o| matches!(o, Outcome::Failed(_)));
     let all = plural(summary.frames.len(), "render", "renders");

@@ -162,6 +162,7 @@ pub fn stairs(offset: DVec3) -> Scene {
         plaster,
         at(DVec3::Z * -1.5),
     );
+
     // Each step is a block down to below the floor: no two faces coincide.
     let (steps, rise, run) = (12, 0.18, 0.3);
     let step =
@@ -172,6 +173,8 @@ pub fn stairs(offset: DVec3) -> Scene {
         scene.add_instance("step", step, at(DVec3::X * x) * DAffine3::from_scale(DVec3::new(1.0, y, 1.0)));
         scene.add_instance("pole", pole, at(DVec3::new(x + run * 0.5, y, 0.5)));
     }
+
+    // the rail, and what stands around
     let slope = (rise / run).atan();
     let length = (steps as f64 + 0.5) * run / slope.cos();
     let rail = shapes::cylinder(0.035, length, 20);

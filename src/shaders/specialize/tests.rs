@@ -41,6 +41,7 @@ fn assert_valid(words: &[u32], what: &str) {
     for i in module.all_inst_iter() {
         assert!(ids(i).all(|id| defined.contains(&id)), "{what}: {:?} names what is not there", i.class.opcode);
     }
+
     // blocks are in the order in which they dominate each other
     let inside: HashSet<u32> = blocks(&module).flat_map(|(_, b)| &b.instructions).filter_map(|i| i.result_id).collect();
     let mut computed = HashSet::new();
@@ -49,6 +50,8 @@ fn assert_valid(words: &[u32], what: &str) {
         assert!(ids(i).all(is_early), "{what}: {:?} uses what is computed later", i.class.opcode);
         computed.extend(i.result_id);
     }
+
+    // constructs of control flow
     let mut merges = HashSet::new();
     for (function, block) in blocks(&module) {
         let label = flow::label(block);

@@ -140,6 +140,8 @@ impl Moves {
         let is_known =
             |o: &Operand| o.id_ref_any().is_none_or(|id| is_from_push(&id) || facts.numbers.contains_key(&id));
         let class = |id: &u32| types.get(id).and_then(|ty| facts.pointers.get(ty)).map(|p| p.0);
+
+        // by kind of instruction
         match (i.class.opcode, &i.operands[..]) {
             (Op::AccessChain | Op::InBoundsAccessChain, [Operand::IdRef(base), indices @ ..]) => {
                 let numbers = indices.iter().map(|o| facts.numbers.get(&o.id_ref_any()?).copied());

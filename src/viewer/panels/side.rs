@@ -376,6 +376,8 @@ fn camera(app: &mut App, ui: &mut Ui) {
             }
         });
     }
+
+    // how it moves
     let Some(control) = &mut app.control else { return };
     ui.horizontal(|ui| {
         let heading = ui.label("Speed of flight");
