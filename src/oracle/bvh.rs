@@ -10,6 +10,8 @@ const LEAF: usize = 4;
 /// the traversal stack.
 const HEURISTIC_DEPTH: u32 = 64;
 const STACK: usize = HEURISTIC_DEPTH as usize + 34;
+/// The two halves of a node with at least so many primitives are built at the same time.
+const PARALLEL: usize = 8192;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -47,40 +49,16 @@ impl Bvh {
     /// primitives.
     pub(super) fn build(boxes: &[Box3]) -> Self {
         let finite = |b: &Box3| b.0.is_finite() && b.1.is_finite();
-        let order: Vec<u32> = (0u32..).zip(boxes).filter(|(_, b)| finite(b)).map(|(i, _)| i).collect();
-        let mut bvh = Self { nodes: Vec::with_capacity(order.len() / 2 + 1), order };
-        let count = bvh.order.len();
-        if count > 0 {
-            bvh.split(boxes, 0, count, 0);
+        let mut order: Vec<u32> = (0u32..).zip(boxes).filter(|(_, b)| finite(b)).map(|(i, _)| i).collect();
+        let mut nodes = Vec::with_capacity(order.len() / 2 + 1);
+        if !order.is_empty() {
+            split(&mut nodes, boxes, &mut order, 0, 0);
         }
-        bvh
+        Self { nodes, order }
     }
 
     pub(super) fn bounds(&self) -> Option<Box3> {
         self.nodes.first().map(|n| (n.lo, n.hi))
-    }
-
-    fn split(&mut self, boxes: &[Box3], first: usize, end: usize, depth: u32) {
-        let center = |i: u32| boxes[i as usize].0 * 0.5 + boxes[i as usize].1 * 0.5;
-        let items = &mut self.order[first..end];
-        let bounds = items.iter().fold(EMPTY, |b, &i| join(b, boxes[i as usize]));
-        let node = self.nodes.len();
-        self.nodes.push(Node { lo: bounds.0, hi: bounds.1, next: first as u32, count: items.len() as u32 });
-        if items.len() <= LEAF {
-            return;
-        }
-        let (lo, hi) = items.iter().fold(EMPTY, |b, &i| join(b, (center(i), center(i))));
-        let axis = (0..3).max_by(|&a, &b| (hi - lo)[a].total_cmp(&(hi - lo)[b])).unwrap_or(0);
-        let middle = if depth < HEURISTIC_DEPTH { binned_split(boxes, items, axis, lo[axis], hi[axis]) } else { None };
-        let middle = middle.unwrap_or_else(|| {
-            let half = items.len() / 2;
-            items.select_nth_unstable_by(half, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]));
-            half
-        });
-        self.split(boxes, first, first + middle, depth + 1);
-        self.nodes[node].next = self.nodes.len() as u32;
-        self.nodes[node].count = 0;
-        self.split(boxes, first + middle, end, depth + 1);
     }
 
     /// Calls `visit` for every primitive whose box, widened by `pad`, the ray meets within
@@ -150,6 +128,49 @@ impl Bvh {
     }
 }
 
+/// Appends the tree over `items`, which begin at `first` of the order.
+fn split(nodes: &mut Vec<Node>, boxes: &[Box3], items: &mut [u32], first: usize, depth: u32) {
+    let center = |i: u32| boxes[i as usize].0 * 0.5 + boxes[i as usize].1 * 0.5;
+    let (mut bounds, mut centers) = (EMPTY, EMPTY);
+    for &i in items.iter() {
+        bounds = join(bounds, boxes[i as usize]);
+        centers = join(centers, (center(i), center(i)));
+    }
+    let (node, count) = (nodes.len(), items.len());
+    nodes.push(Node { lo: bounds.0, hi: bounds.1, next: first as u32, count: count as u32 });
+    if count <= LEAF {
+        return;
+    }
+
+    // by the heuristic, or into halves
+    let (lo, hi) = centers;
+    let axis = (0..3).max_by(|&a, &b| (hi - lo)[a].total_cmp(&(hi - lo)[b])).unwrap_or(0);
+    let middle = if depth < HEURISTIC_DEPTH { binned_split(boxes, items, axis, lo[axis], hi[axis]) } else { None };
+    let middle = middle.unwrap_or_else(|| {
+        items.select_nth_unstable_by(count / 2, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]));
+        count / 2
+    });
+
+    // the first child follows its parent, the second one the tree below the first
+    let (left, right) = items.split_at_mut(middle);
+    let mut second = Vec::new();
+    if count < PARALLEL {
+        split(nodes, boxes, left, first, depth + 1);
+    } else {
+        rayon::join(
+            || split(nodes, boxes, left, first, depth + 1),
+            || split(&mut second, boxes, right, first + middle, depth + 1),
+        );
+    }
+    let at = nodes.len() as u32;
+    (nodes[node].next, nodes[node].count) = (at, 0);
+    if count < PARALLEL {
+        split(nodes, boxes, right, first + middle, depth + 1);
+    } else {
+        nodes.extend(second.into_iter().map(|n| if n.count == 0 { Node { next: n.next + at, ..n } } else { n }));
+    }
+}
+
 /// Partitions `items` by the best of the planes between bins; `None` when all centres coincide.
 fn binned_split(boxes: &[Box3], items: &mut [u32], axis: usize, lo: f64, hi: f64) -> Option<usize> {
     let scale = BINS as f64 / (hi - lo);
@@ -165,14 +186,22 @@ fn binned_split(boxes: &[Box3], items: &mut [u32], axis: usize, lo: f64, hi: f64
         let (b, n) = &mut bins[bin(i)];
         (*b, *n) = (join(*b, boxes[i as usize]), *n + 1);
     }
-    let cost = |parts: &[(Box3, usize)]| {
-        let (b, n) = parts.iter().fold((EMPTY, 0), |(b, n), p| (join(b, p.0), n + p.1));
-        if n == 0 { f64::INFINITY } else { half_area(b) * n as f64 }
-    };
-    let best = (1..BINS).min_by(|&a, &b| {
-        let total = |k: usize| cost(&bins[..k]) + cost(&bins[k..]);
-        total(a).total_cmp(&total(b))
-    })?;
+
+    // costs of what is before and behind each plane, by a sweep from either side
+    let add = |(b, n): (Box3, usize), bin: &(Box3, usize)| (join(b, bin.0), n + bin.1);
+    let cost = |(b, n): (Box3, usize)| if n == 0 { f64::INFINITY } else { half_area(b) * n as f64 };
+    let (mut before, mut behind, mut costs) = ((EMPTY, 0), (EMPTY, 0), [0.0; BINS]);
+    for k in (1..BINS).rev() {
+        behind = add(behind, &bins[k]);
+        costs[k] = cost(behind);
+    }
+    for k in 1..BINS {
+        before = add(before, &bins[k - 1]);
+        costs[k] += cost(before);
+    }
+    let best = (1..BINS).min_by(|&a, &b| costs[a].total_cmp(&costs[b]))?;
+
+    // what is before the best one comes first
     let mut middle = 0;
     for k in 0..items.len() {
         if bin(items[k]) < best {

@@ -118,6 +118,12 @@ impl<'s> Survey<'s> {
 
     /// Distances of the nearest surfaces around a point of a closed room or solid body, or `None`.
     pub fn walls(&self, eye: DVec3) -> Option<[f64; WALL_DIRECTIONS]> {
+        // most places that are open are open outside, or to the sky
+        let (lo, hi) = self.bounds?;
+        let upwards = [sphere_directions()[0]];
+        if eye.cmplt(lo).any() || eye.cmpgt(hi).any() || self.nearest(eye, upwards)[0].0 == f64::INFINITY {
+            return None;
+        }
         let distances = self.nearest(eye, sphere_directions()).map(|(distance, _)| distance);
         distances.iter().all(|d| d.is_finite()).then_some(distances)
     }
