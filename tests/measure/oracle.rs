@@ -42,17 +42,35 @@ fn bvh_equals_brute_force() {
     for name in names {
         let s = scene(name);
         let o = Oracle::new(&s, s.origin());
+        let quick = Oracle::for_few_rays(&s, s.origin());
         let rays = all_rays(&o, &s, 60);
         let mut hits = 0;
         for ray in &rays {
             let (a, b) = (o.closest(ray), o.brute_force_closest(ray));
             assert_eq!(a, b, "{name}: {ray:?}");
+            assert_eq!(quick.closest(ray), a, "{name}: {ray:?}");
             assert_eq!(o.any(ray), a.is_hit(), "{name}: {ray:?}");
             assert_eq!(o.brute_force_any(ray), a.is_hit(), "{name}: {ray:?}");
             hits += a.is_hit() as usize;
         }
         println!("{name}: {} primitives, {} rays, {hits} hits", o.primitive_count(), rays.len());
         assert!(hits > rays.len() / 10, "{name}: {hits} hits");
+    }
+}
+
+/// Hierarchies of so many primitives are built on several cores.
+#[test]
+fn large_hierarchies_have_the_hits_of_one_another() {
+    let s = scene("terrain:40000");
+    let (o, quick) = (Oracle::new(&s, s.origin()), Oracle::for_few_rays(&s, s.origin()));
+    assert_eq!(o.bounds(), quick.bounds());
+    let rays = all_rays(&o, &s, 200);
+    for (k, ray) in rays.iter().enumerate() {
+        let hit = o.closest(ray);
+        assert_eq!(quick.closest(ray), hit, "{ray:?}");
+        if k % 100 == 0 {
+            assert_eq!(o.brute_force_closest(ray), hit, "{ray:?}");
+        }
     }
 }
 
@@ -65,7 +83,7 @@ fn bvh_equals_brute_force_on_awkward_rays() {
     ] {
         let s = analytic::closed_box(2.0, at);
         for origin in [DVec3::ZERO, s.origin()] {
-            let o = Oracle::new(&s, origin);
+            let (o, quick) = (Oracle::new(&s, origin), Oracle::for_few_rays(&s, origin));
             let values = [-1.5, -1.0, -0.5, 0.0, 0.25, 1.0, 2.0];
             for x in values {
                 for y in values {
@@ -85,7 +103,9 @@ fn bvh_equals_brute_force_on_awkward_rays() {
                                 tmin: 0.0,
                                 tmax: f64::INFINITY,
                             };
-                            assert_eq!(o.closest(ray), o.brute_force_closest(ray), "{name}: {ray:?}");
+                            let hit = o.brute_force_closest(ray);
+                            assert_eq!(o.closest(ray), hit, "{name}: {ray:?}");
+                            assert_eq!(quick.closest(ray), hit, "{name}: {ray:?}");
                         }
                     }
                 }

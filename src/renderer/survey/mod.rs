@@ -74,7 +74,7 @@ impl<'s> Survey<'s> {
     /// Finds the surfaces that rays hit, without any error.
     pub fn trace(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
         let origin = self.scene.origin();
-        let oracle = self.oracle.get_or_init(|| Oracle::new(self.scene, origin));
+        let oracle = self.oracle.get_or_init(|| Oracle::for_few_rays(self.scene, origin));
         let closest = |&(from, direction): &(DVec3, DVec3)| {
             let ray = OracleRay { origin: from - origin, tmin: 0.0, direction, tmax: f64::INFINITY };
             let hit = oracle.closest(ray);
