@@ -1,5 +1,6 @@
 //! A plain binary BVH in double precision: by the binned surface area heuristic (Wald 2007), or in
-//! the order of a Morton curve (Lauterbach et al. 2009), which is quickly built and slower to trace.
+//! the order of a Morton curve (Lauterbach et al. 2009), which is quickly built and slower to
+//! trace.
 
 use super::OracleRay;
 use glam::DVec3;
@@ -58,7 +59,8 @@ impl Bvh {
         Self { nodes, order }
     }
 
-    /// Builds a tree for few rays: in a fraction of the time of [`Bvh::build`], and rays take longer.
+    /// Builds a tree for few rays: in a fraction of the time of [`Bvh::build`], and rays take
+    /// longer.
     pub(super) fn build_quickly(boxes: &[Box3]) -> Self {
         let center = |i: u32| boxes[i as usize].0 * 0.5 + boxes[i as usize].1 * 0.5;
         let order = finite(boxes);
