@@ -33,6 +33,9 @@ pub type Trace<'a> = dyn Fn(&[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurfa
 
 /// Scenes with more primitives are not surveyed on the host: a hierarchy would take too long.
 const MAX_PRIMITIVES: u64 = 5_000_000;
+/// With more primitives, building a hierarchy takes longer than the rays of a survey: it is built
+/// quickly. With fewer, rooms above all, one that suits the rays is worth its time.
+const MANY_PRIMITIVES: u64 = 400_000;
 
 /// A scene to be looked at by rays that are traced on the host, in double precision.
 pub struct Survey<'s> {
@@ -68,13 +71,19 @@ impl<'s> Survey<'s> {
 
     /// Whether the scene is small enough for rays.
     pub fn is_small(&self) -> bool {
-        self.scene.triangle_count() + self.scene.sphere_count() <= MAX_PRIMITIVES
+        self.primitive_count() <= MAX_PRIMITIVES
+    }
+
+    fn primitive_count(&self) -> u64 {
+        self.scene.triangle_count() + self.scene.sphere_count()
     }
 
     /// Finds the surfaces that rays hit, without any error.
     pub fn trace(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
         let origin = self.scene.origin();
-        let oracle = self.oracle.get_or_init(|| Oracle::for_few_rays(self.scene, origin));
+        let is_large = self.primitive_count() > MANY_PRIMITIVES;
+        let build = if is_large { Oracle::for_few_rays } else { Oracle::new };
+        let oracle = self.oracle.get_or_init(|| build(self.scene, origin));
         let closest = |&(from, direction): &(DVec3, DVec3)| {
             let ray = OracleRay { origin: from - origin, tmin: 0.0, direction, tmax: f64::INFINITY };
             let hit = oracle.closest(ray);
