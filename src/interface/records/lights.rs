@@ -46,7 +46,8 @@ records! {
         intensity: vec3,
         /// Lights from a position: range beyond which the light has no effect, scene units.
         range: float,
-        /// Probability among distant lights; of placed ones where the point does not matter.
+        /// Distant lights: probability of being chosen among them. Placed ones: the same, for the
+        /// samples that choose without looking at the point.
         probability: float,
         /// Lower 32 bits of a placed light's trail: bit k is set for the second child at level k.
         trail_low: uint,
