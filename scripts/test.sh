@@ -7,7 +7,7 @@
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
 # the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one), lints of the library alone and of the program without benchmarks and viewer.
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
-# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays, degenerate scenes a quarter and brute force a third of that, and frames at rest are followed in one of four scenes. The floor driver leaves
+# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays (a hundredth on the floor driver, as other large sets of rays there a tenth), degenerate scenes a quarter and brute force a third of that, and frames at rest are followed in one of four scenes. The floor driver leaves
 # out tests of code that knows no driver: scenes that change (tests/tracer), how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
 # program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/ci.md) are rendered on both drivers.
 #

@@ -26,6 +26,12 @@ pub fn is_full() -> bool {
     std::env::var_os("SKYLIT_FULL").is_some()
 }
 
+/// What numbers of rays are divided by: 10 on the floor driver, where a ray takes ten times as long and a tenth of them shows what the driver's
+/// rounding does, else 1; always 1 with `./scripts/test.sh --full`.
+pub fn divisor() -> u32 {
+    if std::env::var_os("SKYLIT_REQUIRE_DRIVER").is_some() && !is_full() { 10 } else { 1 }
+}
+
 /// The default device with the validation layer; a machine without Vulkan fails the tests: software drivers exist. All tests of a process
 /// have the same one, and compile a pipeline once between them: compiling is most of what small images cost on a CPU driver.
 pub fn device() -> Arc<Device> {

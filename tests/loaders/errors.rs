@@ -271,12 +271,12 @@ fn nothing_to_render() {
 #[test]
 fn extensions() {
     let mut doc = Doc::triangle();
-    doc.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
+    doc.json["extensionsUsed"] = json!(["EXT_lights_ies"]);
     let scene = doc.load();
-    assert!(scene.report.warnings[0].contains("KHR_draco_mesh_compression"));
-    doc.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+    assert!(scene.report.warnings[0].contains("EXT_lights_ies"));
+    doc.json["extensionsRequired"] = json!(["EXT_lights_ies"]);
     let text = doc.error();
-    assert!(text.contains("KHR_draco_mesh_compression") && text.contains("without mesh compression"), "{text}");
+    assert!(text.contains("EXT_lights_ies") && text.contains("export the file without it"), "{text}");
 }
 
 /// An index beyond 32 bits is no index, and not what its lower bits say.

@@ -4,6 +4,7 @@ mod animation;
 mod brhan;
 mod build;
 mod camera_path;
+mod compressed;
 mod environment;
 mod errors;
 mod export;

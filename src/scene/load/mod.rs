@@ -9,6 +9,8 @@ mod environment;
 mod find;
 mod finish;
 mod gltf;
+#[cfg(feature = "ktx2")]
+mod ktx2;
 mod model;
 mod normals;
 mod obj;

@@ -7,9 +7,11 @@ use crate::memory::Budget;
 use crate::output::decode::{self, MaxSize};
 use crate::output::radiance::{self, RadianceImage};
 use crate::scene::TexelData;
+#[cfg(feature = "ktx2")]
+use crate::scene::load::ktx2;
 
 /// Largest width and height.
-const MAX_SIDE: u32 = 16384;
+pub(super) const MAX_SIDE: u32 = 16384;
 
 /// A decoded image: rows from the top, RGBA.
 #[derive(Clone, Debug)]
@@ -36,6 +38,12 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
     if let Some(message) = placeholder(bytes) {
         return Err(message.to_owned());
     }
+
+    // formats that the crate image does not have
+    #[cfg(feature = "ktx2")]
+    if ktx2::is_ktx2(bytes) {
+        return ktx2::decode(bytes, budget);
+    }
     if radiance::is_radiance(bytes) {
         let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE, budget)?;
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
@@ -43,13 +51,17 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
             rgb.into_iter().flat_map(|[r, g, b]| [finite(r), finite(g), finite(b), 1.0]).collect::<Vec<f32>>().into();
         return Ok(DecodedImage { width, height, texels });
     }
+
+    // the others, whose size is checked before they are decoded
     let format = image::guess_format(bytes)
         .or_else(|_| ImageFormat::from_path(name))
-        .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, WebP, TGA and BMP are)".to_owned())?;
+        .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, WebP, KTX2, TGA and BMP are)".to_owned())?;
     // a one-bit PNG packs at most 8 * 1032 pixels into a byte, every other format fewer
     let max = MaxSize { side: MAX_SIDE, pixels_per_byte: Some(10_000), budget, pixel_bytes: texel_bytes };
     let pixels = decode::decode(bytes, format, max)?;
     let (width, height) = (pixels.width(), pixels.height());
+
+    // four channels of what the file has
     let texels = match pixels.color() {
         ColorType::Rgb32F | ColorType::Rgba32F => {
             let mut rgba = pixels.into_rgba32f().into_raw();

@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::{Index, Root, buffer};
 
+use super::compressed::Decoded;
 use super::values::valid;
 use crate::memory::Budget;
 
@@ -17,6 +18,8 @@ pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
 pub(super) struct Reader<'a> {
     pub document: &'a Root,
     pub buffers: &'a [BufferBytes<'a>],
+    /// Decoded parts of the file.
+    pub decoded: &'a Decoded,
     /// Budget that the memory of arrays is taken from.
     pub budget: &'a Budget,
 }
@@ -69,6 +72,14 @@ struct Elements<'a> {
     stride: usize,
 }
 
+/// Elements of an accessor without what a sparse part replaces.
+struct Base<'a> {
+    /// `None`: zeros.
+    elements: Option<Elements<'a>>,
+    component: ComponentType,
+    count: u64,
+}
+
 /// The numbers of a scalar accessor of unsigned integers, read where they lie.
 pub(super) enum Indices<'a> {
     /// No copy.
@@ -110,7 +121,9 @@ impl<'a> Reader<'a> {
 
     /// Number of elements.
     pub(super) fn count(&self, index: Index<Accessor>) -> Result<usize, String> {
-        usize::try_from(self.accessor(index)?.count.0).map_err(|_| format!("accessor {index} has too many elements"))
+        let declared = self.accessor(index)?.count.0;
+        let count = self.decoded.accessor(index.value()).transpose()?.map_or(declared, |e| e.count);
+        usize::try_from(count).map_err(|_| format!("accessor {index} has too many elements"))
     }
 
     /// Returns the type of an accessor's elements.
@@ -121,7 +134,12 @@ impl<'a> Reader<'a> {
     /// Whether the file has values for it: without, they are zeros.
     pub(super) fn has_data(&self, index: Index<Accessor>) -> Result<bool, String> {
         let accessor = self.accessor(index)?;
-        Ok(accessor.buffer_view.is_some() || accessor.sparse.is_some())
+        Ok(accessor.buffer_view.is_some() || accessor.sparse.is_some() || self.is_decoded(index))
+    }
+
+    /// Returns true if a compressed primitive has the elements of an accessor.
+    pub(super) fn is_decoded(&self, index: Index<Accessor>) -> bool {
+        self.decoded.accessor(index.value()).is_some()
     }
 
     /// The bytes and stride of a buffer view.
@@ -130,23 +148,44 @@ impl<'a> Reader<'a> {
         let view = views
             .get(index.value())
             .ok_or_else(|| format!("buffer view {index} does not exist (the file has {})", views.len()))?;
-        let buffer = self
-            .buffers
-            .get(view.buffer.value())
-            .ok_or_else(|| format!("buffer view {index} refers to buffer {}, which does not exist", view.buffer))?
-            .as_ref()
-            .map_err(Clone::clone)?;
-        // the declared length counts, not the padding that may follow
-        let declared = self.document.buffers[view.buffer.value()].byte_length.0.min(buffer.len() as u64);
-        let (offset, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);
-        match offset.checked_add(length) {
-            Some(end) if end <= declared => {
-                Ok((&buffer[offset as usize..end as usize], view.byte_stride.map(|s| s.0).filter(|&s| s > 0)))
-            }
-            _ => {
-                Err(format!("buffer view {index} lies outside of its buffer (bytes {offset} + {length} of {declared})"))
-            }
+        let stride = view.byte_stride.map(|s| s.0).filter(|&s| s > 0);
+        if let Some(bytes) = self.decoded.view(index.value()) {
+            return Ok((bytes?, stride));
         }
+        let (offset, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);
+        let bytes = self.buffer_range(view.buffer.value(), offset, length);
+        Ok((bytes.map_err(|e| format!("buffer view {index} {e}"))?, stride))
+    }
+
+    /// `length` bytes from `offset` on in a buffer.
+    ///
+    /// # Errors
+    /// What is wrong with whatever refers to them, without its name.
+    pub(super) fn buffer_range(&self, buffer: usize, offset: u64, length: u64) -> Result<&'a [u8], String> {
+        let bytes =
+            self.buffers.get(buffer).ok_or_else(|| format!("refers to buffer {buffer}, which does not exist"))?;
+        let bytes = bytes.as_ref().map_err(|e| format!("cannot be read: {e}"))?;
+        // the declared length counts, not the padding that may follow
+        let declared = self.document.buffers[buffer].byte_length.0.min(bytes.len() as u64);
+        match offset.checked_add(length) {
+            Some(end) if end <= declared => Ok(&bytes[offset as usize..end as usize]),
+            _ => Err(format!("lies outside of its buffer (bytes {offset} + {length} of {declared})")),
+        }
+    }
+
+    /// The elements of an accessor, their component type and number, before a sparse part replaces
+    /// some; none if they are zeros. `components`: of an element.
+    fn base(&self, index: Index<Accessor>, components: usize) -> Result<Base<'a>, String> {
+        let accessor = self.accessor(index)?;
+        if let Some(decoded) = self.decoded.accessor(index.value()) {
+            let decoded = decoded?;
+            let elements = Elements { bytes: &decoded.bytes, stride: components * decoded.component.size() };
+            return Ok(Base { elements: Some(elements), component: decoded.component, count: decoded.count });
+        }
+        let (component, count) = (self.component(accessor)?, accessor.count.0);
+        let offset = accessor.byte_offset.unwrap_or_default().0;
+        let elements = accessor.buffer_view.map(|v| self.elements(v, offset, count, components * component.size()));
+        Ok(Base { elements: elements.transpose()?, component, count })
     }
 
     /// `count` elements of `size` bytes from `offset` on in a buffer view.
@@ -189,33 +228,23 @@ impl<'a> Reader<'a> {
             }
             None => return Err(format!("accessor {index} is of an unknown type where {} is needed", name(shape))),
         }
-        self.try_floats(accessor, make).map_err(|e| format!("accessor {index}: {e}"))
+        self.try_floats(index, accessor, make).map_err(|e| format!("accessor {index}: {e}"))
     }
 
     fn try_floats<const N: usize, T>(
         &self,
+        index: Index<Accessor>,
         accessor: &Accessor,
         make: impl Fn([f32; N]) -> T,
     ) -> Result<Vec<T>, String> {
-        let component = self.component(accessor)?;
-        let bytes = accessor.count.0.saturating_mul(size_of::<T>() as u64);
-        let make_room = || self.take(bytes, accessor.count.0);
-        let mut out = match accessor.buffer_view {
-            Some(view) => {
-                let elements = self.elements(
-                    view,
-                    accessor.byte_offset.unwrap_or_default().0,
-                    accessor.count.0,
-                    N * component.size(),
-                )?;
-                make_room()?;
-                gather(&elements, accessor.count.0 as usize, component, accessor.normalized, &make)
-            }
-            None => {
-                make_room()?;
-                (0..accessor.count.0).map(|_| make([0.0; N])).collect()
-            }
+        let base = self.base(index, N)?;
+        self.take(base.count.saturating_mul(size_of::<T>() as u64), base.count)?;
+        let count = base.count as usize;
+        let mut out = match base.elements {
+            Some(elements) => gather(&elements, count, base.component, accessor.normalized, &make),
+            None => (0..count).map(|_| make([0.0; N])).collect(),
         };
+        let component = self.component(accessor)?;
         if let Some((at, values)) = self.sparse(accessor, N * component.size())? {
             let values = gather(&values, at.len(), component, accessor.normalized, &make);
             for (i, value) in at.into_iter().zip(values) {
@@ -228,27 +257,22 @@ impl<'a> Reader<'a> {
     /// Reads a scalar accessor of unsigned integers.
     pub(super) fn indices(&self, index: Index<Accessor>) -> Result<Indices<'a>, String> {
         let accessor = self.accessor(index)?;
-        self.try_indices(accessor).map_err(|e| format!("accessor {index}: {e}"))
+        self.try_indices(index, accessor).map_err(|e| format!("accessor {index}: {e}"))
     }
 
-    fn try_indices(&self, accessor: &Accessor) -> Result<Indices<'a>, String> {
+    fn try_indices(&self, index: Index<Accessor>, accessor: &Accessor) -> Result<Indices<'a>, String> {
         let component = self.component(accessor)?;
         if valid(accessor.type_) != Some(Type::Scalar) || !component.is_index() {
             return Err("does not hold indices (unsigned scalars)".to_owned());
         }
-        let base = match accessor.buffer_view {
-            Some(view) => {
-                let Elements { bytes, stride } = self.elements(
-                    view,
-                    accessor.byte_offset.unwrap_or_default().0,
-                    accessor.count.0,
-                    component.size(),
-                )?;
-                Indices::InPlace { bytes, count: accessor.count.0 as usize, stride, size: component.size() }
+        let Base { elements, component: stored, count } = self.base(index, 1)?;
+        let base = match elements {
+            Some(Elements { bytes, stride }) => {
+                Indices::InPlace { bytes, count: count as usize, stride, size: stored.size() }
             }
             None => {
-                self.take(accessor.count.0.saturating_mul(4), accessor.count.0)?;
-                Indices::Owned(vec![0; accessor.count.0 as usize])
+                self.take(count.saturating_mul(4), count)?;
+                Indices::Owned(vec![0; count as usize])
             }
         };
         let Some((at, values)) = self.sparse(accessor, component.size())? else { return Ok(base) };

@@ -7,6 +7,7 @@ use ::gltf::json::{Buffer, Root};
 use serde_json::{Value, json};
 
 use super::accessor::BufferBytes;
+use super::compressed;
 use super::node::Doubles;
 use super::uri::{self, Uri};
 use crate::error::{Error, Result};
@@ -275,14 +276,9 @@ pub(super) fn buffers<'a>(
     path: &Path,
     loading: Loading,
 ) -> Vec<BufferBytes<'a>> {
-    let mut used = vec![false; document.buffers.len()];
-    for view in &document.buffer_views {
-        if let Some(used) = used.get_mut(view.buffer.value()) {
-            *used = true;
-        }
-    }
+    let used = compressed::used_buffers(document);
     let read = |(i, buffer): (usize, &Buffer)| {
-        if used[i] {
+        if used.contains(&i) {
             read_buffer(i, buffer, bin, path, loading).map_err(|e| format!("buffer {i} {e}"))
         } else {
             Err(format!("buffer {i} is not used by a buffer view"))
@@ -290,9 +286,6 @@ pub(super) fn buffers<'a>(
     };
     document.buffers.iter().enumerate().map(read).collect()
 }
-
-/// Extensions that replace the content of buffers.
-const COMPRESSION: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 fn read_buffer<'a>(
     index: usize,
@@ -306,9 +299,10 @@ fn read_buffer<'a>(
         (None, Some(bin)) if index == 0 => bin.into(),
         (None, _) => {
             let others = buffer.extensions.as_ref().map(|e| &e.others);
-            return Err(match COMPRESSION.iter().find(|name| others.is_some_and(|o| o.contains_key(**name))) {
+            return Err(match compressed::MESHOPT.iter().find(|name| others.is_some_and(|o| o.contains_key(**name))) {
                 Some(name) => format!(
-                    "has no bytes of its own: the extension {name} fills it, which skylit does not support: export the file without mesh compression"
+                    "has no bytes of its own: the extension {name} fills it, for views that it compressed{}",
+                    if cfg!(feature = "meshopt") { "" } else { ", and this program was built without it" }
                 ),
                 None => "has neither a URI nor a binary chunk".to_owned(),
             });

@@ -6,6 +6,7 @@ use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::accessor::{Indices, Reader};
+use super::compressed::{self, DRACO};
 use super::values::{AccessorIndex, valid};
 use crate::scene::TriangleMesh;
 
@@ -38,13 +39,15 @@ pub(super) fn read(
         warn("has no positions: skipped".to_owned());
         return Ok(None);
     };
-    const DRACO: &str = "KHR_draco_mesh_compression";
-    let compressed = primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(DRACO));
-    if compressed && !reader.has_data(position)? {
+    let is_compressed = compressed::draco_extension(primitive).is_some();
+    if is_compressed && !reader.has_data(position)? {
         return Err(format!(
-            "accessor {position} has no data of its own: the extension {DRACO} fills it, which skylit does not support: export the file without mesh compression"
+            "accessor {position} has no data of its own, and the extension {DRACO} does not fill it{}",
+            if cfg!(feature = "draco") { "" } else { ": this program was built without it" }
         ));
     }
+    // compressed strips are lists once they are decoded
+    let mode = if primitive.indices.is_some_and(|i| reader.is_decoded(i)) { Mode::Triangles } else { mode };
     let mut mesh =
         TriangleMesh { positions: reader.floats(position, Type::Vec3, Vec3::from_array)?, ..Default::default() };
     let vertices = mesh.positions.len();

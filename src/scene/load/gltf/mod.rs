@@ -11,6 +11,7 @@
 
 mod accessor;
 mod animation;
+mod compressed;
 mod container;
 mod material;
 mod mesh;
@@ -27,6 +28,7 @@ use std::path::Path;
 use ::gltf::json::Root;
 
 use accessor::Reader;
+use compressed::Decoded;
 use glam::{DAffine3, DVec3};
 use rig::{MeshVariant, RigBuilder};
 use values::text;
@@ -36,20 +38,25 @@ use super::options::Loading;
 use crate::error::{Error, Result};
 use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
 
-/// Supported extensions.
-const KNOWN: &[&str] = &[
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
+/// Extensions that skylit reads, and whether this program was built with what they need.
+const KNOWN: &[(&str, bool)] = &[
+    ("EXT_meshopt_compression", cfg!(feature = "meshopt")),
+    ("EXT_texture_webp", true),
+    ("KHR_draco_mesh_compression", cfg!(feature = "draco")),
+    ("KHR_lights_punctual", true),
+    ("KHR_materials_anisotropy", true),
+    ("KHR_materials_clearcoat", true),
+    ("KHR_materials_emissive_strength", true),
+    ("KHR_materials_ior", true),
+    ("KHR_materials_sheen", true),
+    ("KHR_materials_specular", true),
+    ("KHR_materials_transmission", true),
+    ("KHR_materials_unlit", true),
+    ("KHR_materials_volume", true),
+    ("KHR_mesh_quantization", true),
+    ("KHR_meshopt_compression", cfg!(feature = "meshopt")),
+    ("KHR_texture_basisu", cfg!(feature = "ktx2")),
+    ("KHR_texture_transform", true),
 ];
 
 /// Reads a `.gltf` or `.glb` file.
@@ -64,7 +71,9 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     extensions(&document, path, &mut scene)?;
     scene.report.files = container::files(&document, path, loading.options.confine.folder())?;
     let buffers = container::buffers(&document, chunks.bin, path, loading);
-    let reader = Reader { document: &document, buffers: &buffers, budget };
+    let stored = Reader { document: &document, buffers: &buffers, decoded: &Decoded::default(), budget };
+    let decoded = compressed::decode(&stored);
+    let reader = Reader { decoded: &decoded, ..stored };
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();
@@ -116,27 +125,22 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
 
 /// Fails for unsupported required extensions, and warns about unsupported optional ones.
 fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
-    let unknown = |names: &[String]| names.iter().find(|n| !KNOWN.contains(&n.as_str())).cloned();
-    if let Some(name) = unknown(&document.extensions_required) {
-        let remedy = match name.as_str() {
-            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-                "export the file without mesh compression"
-            }
-            "KHR_texture_basisu" | "EXT_texture_webp" => "export the file with PNG or JPEG textures",
-            _ => "export the file without it",
+    let is_read = |name: &str| KNOWN.contains(&(name, true));
+    if let Some(name) = document.extensions_required.iter().find(|name| !is_read(name)) {
+        let reason = if KNOWN.contains(&(name, false)) {
+            "which this program was built without"
+        } else {
+            "which skylit does not support"
         };
-        return Err(Error::input(
-            path,
-            format!("requires the extension {name}, which skylit does not support: {remedy}"),
-        ));
+        return Err(Error::input(path, format!("requires the extension {name}, {reason}: export the file without it")));
     }
     let required: HashSet<&String> = document.extensions_required.iter().collect();
     scene.report.extensions.extend(document.extensions_used.iter().map(|name| FileExtension {
         name: name.clone(),
         required: required.contains(name),
-        ignored: !KNOWN.contains(&name.as_str()),
+        ignored: !is_read(name),
     }));
-    for name in document.extensions_used.iter().filter(|n| !KNOWN.contains(&n.as_str())) {
+    for name in document.extensions_used.iter().filter(|name| !is_read(name)) {
         scene.report.warnings.push(format!("the extension {name} is ignored"));
     }
     Ok(())
@@ -229,6 +233,7 @@ mod tests {
         let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/formats.md")).unwrap();
         let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` | used |"));
         let listed: Vec<&str> = rows.map(|(name, _)| name).collect();
-        assert_eq!(listed, KNOWN);
+        let known: Vec<&str> = KNOWN.iter().map(|(name, _)| *name).collect();
+        assert_eq!(listed, known);
     }
 }

@@ -36,11 +36,7 @@ pub(super) fn resolve(
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
         used.insert(slot.texture, None);
     }
-    // the crate's stand-in for a texture without a source, which is for extensions with other
-    // formats to give
-    const NO_SOURCE: usize = u32::MAX as usize;
-    let source_of = |texture: &json::Texture| Some(texture.source.value()).filter(|&s| s != NO_SOURCE);
-    let image_of = |texture: usize| document.textures.get(texture).and_then(source_of);
+    let image_of = |texture: usize| document.textures.get(texture).and_then(source);
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
@@ -74,8 +70,8 @@ pub(super) fn resolve(
             warn(format!("texture {index} does not exist: shown without it"));
             continue;
         };
-        let Some(source) = source_of(texture) else {
-            warn(format!("texture {index} has no PNG or JPEG image: shown without it"));
+        let Some(source) = source(texture) else {
+            warn(format!("texture {index} has no image that skylit reads: shown without it"));
             continue;
         };
         let Some(Ok(picture)) = same.get(&source).and_then(|first| decoded.get(first)) else { continue };
@@ -105,6 +101,23 @@ pub(super) fn resolve(
         }
     }
     (textures, skipped)
+}
+
+/// Extensions by which a texture has an image of another format than PNG and JPEG.
+const SOURCES: &[(&str, bool)] = &[("KHR_texture_basisu", cfg!(feature = "ktx2")), ("EXT_texture_webp", true)];
+
+/// Index of a texture's image. One of an extension comes first, as these want it: what stands
+/// beside it is for programs without them.
+fn source(texture: &json::Texture) -> Option<usize> {
+    // the crate's stand-in for a texture without a source
+    const NO_SOURCE: usize = u32::MAX as usize;
+    let extensions = texture.extensions.as_ref().map(|e| &e.others);
+    let of_extension = |name: &str| extensions?.get(name)?.get("source")?.as_u64()?.try_into().ok();
+    let supported = SOURCES.iter().filter(|(_, is_supported)| *is_supported);
+    supported
+        .filter_map(|(name, _)| of_extension(name))
+        .next()
+        .or_else(|| Some(texture.source.value()).filter(|&s| s != NO_SOURCE))
 }
 
 fn image(reader: &Reader, path: &Path, loading: Loading, index: usize) -> Result<DecodedImage, String> {
