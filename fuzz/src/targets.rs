@@ -17,6 +17,9 @@ pub type Target = fn(&Path, &[u8]) -> bool;
 pub const TARGETS: &[(&str, Target)] = &[
     ("gltf", gltf),
     ("glb", glb),
+    ("draco", draco),
+    ("meshopt", meshopt),
+    ("ktx2", ktx2),
     ("obj", obj),
     ("mtl", mtl),
     ("brhan", brhan),
@@ -79,6 +82,69 @@ pub fn gltf(folder: &Path, data: &[u8]) -> bool {
 /// A binary glTF file.
 pub fn glb(folder: &Path, data: &[u8]) -> bool {
     scene(folder, "a.glb", data)
+}
+
+/// Positions of a triangle.
+const TRIANGLE: &str = "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+
+/// A stream of Draco, the mesh of a glTF file.
+pub fn draco(folder: &Path, data: &[u8]) -> bool {
+    write(folder, "a.bin", data);
+    let document = format!(
+        r#"{{ "asset": {{ "version": "2.0" }}, "scenes": [{{ "nodes": [0] }}], "nodes": [{{ "mesh": 0 }}],
+            "extensionsUsed": ["KHR_draco_mesh_compression"], "extensionsRequired": ["KHR_draco_mesh_compression"],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0, "TEXCOORD_0": 1 }}, "indices": 2,
+                "extensions": {{ "KHR_draco_mesh_compression":
+                    {{ "bufferView": 0, "attributes": {{ "POSITION": 0, "TEXCOORD_0": 1 }} }} }} }}] }}],
+            "accessors": [{{ "componentType": 5126, "type": "VEC3", "count": 4 }},
+                {{ "componentType": 5126, "type": "VEC2", "count": 4 }}, {{ "componentType": 5125, "type": "SCALAR", "count": 6 }}],
+            "bufferViews": [{{ "buffer": 0, "byteLength": {0} }}], "buffers": [{{ "uri": "a.bin", "byteLength": {0} }}] }}"#,
+        data.len()
+    );
+    scene(folder, "a.gltf", document.as_bytes())
+}
+
+/// A view that meshoptimizer compressed: a byte for the mode and the filter, one for the size of an element, two for their
+/// number, then what is compressed.
+pub fn meshopt(folder: &Path, data: &[u8]) -> bool {
+    let &[kind, stride, low, high, ref compressed @ ..] = data else { return false };
+    write(folder, "a.bin", compressed);
+    let mode = ["ATTRIBUTES", "TRIANGLES", "INDICES"][usize::from(kind) % 3];
+    let filter = ["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"][usize::from(kind) / 3 % 5];
+    let document = format!(
+        r#"{{ "asset": {{ "version": "2.0" }}, "scenes": [{{ "nodes": [0] }}], "nodes": [{{ "mesh": 0 }}],
+            "extensionsUsed": ["KHR_meshopt_compression"], "extensionsRequired": ["KHR_meshopt_compression"],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }} }}] }}],
+            "accessors": [{{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3 }}],
+            "bufferViews": [{{ "buffer": 1, "byteLength": 36 }},
+                {{ "buffer": 2, "byteLength": 1, "extensions": {{ "KHR_meshopt_compression": {{ "buffer": 0,
+                "byteLength": {0}, "byteStride": {stride}, "count": {count}, "mode": "{mode}", "filter": "{filter}" }} }} }}],
+            "buffers": [{{ "uri": "a.bin", "byteLength": {0} }}, {{ "uri": "{TRIANGLE}", "byteLength": 36 }}, {{ "byteLength": 1 }}] }}"#,
+        compressed.len(),
+        count = u16::from_le_bytes([low, high]),
+    );
+    scene(folder, "a.gltf", document.as_bytes())
+}
+
+/// A KTX2 image, as a texture that is left out if it is broken.
+pub fn ktx2(folder: &Path, data: &[u8]) -> bool {
+    write(folder, "t.ktx2", data);
+    let document = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "extensionsUsed": ["KHR_texture_basisu"], "extensionsRequired": ["KHR_texture_basisu"],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+        "materials": [{ "emissiveTexture": { "index": 0 } }], "images": [{ "uri": "t.ktx2" }],
+        "textures": [{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3 }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "uri": "TRIANGLE", "byteLength": 36 }] }"#
+        .replace("TRIANGLE", TRIANGLE);
+    match load_file(&write(folder, "a.gltf", document.as_bytes())) {
+        Ok(scene) => scene.textures.len() == 1,
+        Err(e) => {
+            assert!(!e.to_string().contains('\n'), "{e}");
+            false
+        }
+    }
 }
 
 /// Wavefront OBJ.

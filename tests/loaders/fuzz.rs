@@ -1,6 +1,6 @@
 //! Broken files: an error or a scene, never a panic, never absurd memory.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use skylit::film::state::FilmState;
@@ -232,6 +232,13 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             "[image]\nsize = [64, 48]\nspp = 16\n",
             "path --size 64x48 --spp 16 --max-depth 4 --exposure 1.5",
         ]),
+        // `scripts/compressed/make.sh` made the files that these are parts of
+        "draco" | "meshopt" | "ktx2" => {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(target);
+            let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path()).collect();
+            files.sort();
+            files.iter().map(|file| std::fs::read(file).unwrap()).collect()
+        }
         _ => panic!("no seeds for {target}"),
     }
 }
@@ -257,6 +264,9 @@ macro_rules! survives {
 survives! {
     gltf 6000,
     glb 6000,
+    draco 6000,
+    meshopt 6000,
+    ktx2 6000,
     obj 6000,
     mtl 3000,
     brhan 6000,

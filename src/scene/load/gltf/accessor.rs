@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::{Index, Root, buffer};
 
-use super::compressed::Decoded;
+use super::decoded::Decoded;
 use super::values::valid;
 use crate::memory::Budget;
 

@@ -13,6 +13,7 @@ mod accessor;
 mod animation;
 mod compressed;
 mod container;
+mod decoded;
 mod material;
 mod mesh;
 mod node;
@@ -28,7 +29,7 @@ use std::path::Path;
 use ::gltf::json::Root;
 
 use accessor::Reader;
-use compressed::Decoded;
+use decoded::Decoded;
 use glam::{DAffine3, DVec3};
 use rig::{MeshVariant, RigBuilder};
 use values::text;

@@ -12,8 +12,9 @@ use ::gltf::json::validation::Checked;
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use serde::Deserialize;
 
-use super::{DRACO, DecodedElements, draco_extension};
+use super::{DRACO, draco_extension};
 use crate::scene::load::gltf::accessor::Reader;
+use crate::scene::load::gltf::decoded::DecodedElements;
 use crate::scene::load::gltf::values::valid;
 
 /// Content of the extension of a primitive.

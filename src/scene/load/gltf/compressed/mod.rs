@@ -12,7 +12,6 @@ mod meshopt;
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::Root;
-use ::gltf::json::accessor::ComponentType;
 use ::gltf::json::mesh::Primitive;
 use rayon::prelude::*;
 use serde_json::Value;
@@ -20,38 +19,10 @@ use serde_json::Value;
 pub(super) use meshopt::{EXTENSIONS as MESHOPT, buffer_of_view};
 
 use super::accessor::Reader;
+use super::decoded::{Decoded, DecodedElements};
 
 /// The extension of primitives.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
-
-/// Decoded parts of a file. Errors are in words, for whoever needs the part.
-#[derive(Default)]
-pub(super) struct Decoded {
-    /// Bytes of buffer views, by the index of the view.
-    views: BTreeMap<usize, Result<Vec<u8>, String>>,
-    /// Elements of accessors, by the index of the accessor.
-    accessors: BTreeMap<usize, Result<DecodedElements, String>>,
-}
-
-/// Elements of an accessor, one after the other.
-pub(super) struct DecodedElements {
-    pub bytes: Vec<u8>,
-    pub component: ComponentType,
-    /// Number of elements, which may differ from what the accessor declares.
-    pub count: u64,
-}
-
-impl Decoded {
-    /// Bytes of a buffer view, if it was compressed.
-    pub(super) fn view(&self, index: usize) -> Option<Result<&[u8], String>> {
-        self.views.get(&index).map(|v| v.as_deref().map_err(Clone::clone))
-    }
-
-    /// Elements of an accessor, if a compressed primitive has them.
-    pub(super) fn accessor(&self, index: usize) -> Option<Result<&DecodedElements, String>> {
-        self.accessors.get(&index).map(|e| e.as_ref().map_err(Clone::clone))
-    }
-}
 
 /// Decodes what is compressed in a file. `reader` has nothing decoded yet.
 pub(super) fn decode(reader: &Reader) -> Decoded {

@@ -1,0 +1,34 @@
+//! Decoded parts of a file, as the reader of accessors takes them.
+
+use std::collections::BTreeMap;
+
+use ::gltf::json::accessor::ComponentType;
+
+/// Decoded parts of a file. Errors are in words, for whoever needs the part.
+#[derive(Default)]
+pub(super) struct Decoded {
+    /// Bytes of buffer views, by the index of the view.
+    pub views: BTreeMap<usize, Result<Vec<u8>, String>>,
+    /// Elements of accessors, by the index of the accessor.
+    pub accessors: BTreeMap<usize, Result<DecodedElements, String>>,
+}
+
+/// Elements of an accessor, one after the other.
+pub(super) struct DecodedElements {
+    pub bytes: Vec<u8>,
+    pub component: ComponentType,
+    /// Number of elements, which may differ from what the accessor declares.
+    pub count: u64,
+}
+
+impl Decoded {
+    /// Bytes of a buffer view, if it was compressed.
+    pub(super) fn view(&self, index: usize) -> Option<Result<&[u8], String>> {
+        self.views.get(&index).map(|v| v.as_deref().map_err(Clone::clone))
+    }
+
+    /// Elements of an accessor, if a compressed primitive has them.
+    pub(super) fn accessor(&self, index: usize) -> Option<Result<&DecodedElements, String>> {
+        self.accessors.get(&index).map(|e| e.as_ref().map_err(Clone::clone))
+    }
+}
