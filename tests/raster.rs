@@ -21,7 +21,7 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, ClipPlanes, Geometry, Instance, Mesh, Motion, Projection, Scene};
 use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
 
-use common::{ALL, assert_validation_clean, scene, tracer, tracers};
+use common::{ALL, assert_validation_clean, picked, scene, tracer, tracers};
 
 const NONE: u32 = u32::MAX;
 const SIZE: [u32; 2] = [320, 200];
@@ -433,7 +433,7 @@ fn gpu_scales_and_distances() {
 #[test]
 fn gpu_rasterized_scenes_follow_updates() {
     let Some(device) = device() else { return };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut scene = scene("grid:3");
         let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![scene.instances[0].mesh] };
         let flat = FlatScene::with_motion(&scene, motion.clone()).unwrap();

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{assert_validation_clean, device, new_device, tracers};
+use common::{assert_validation_clean, device, new_device, picked};
 use skylit::film::NoControl;
 use skylit::measure::comparison::{CompareOptions, compare};
 use skylit::output::{Image, Samples};
@@ -40,7 +40,7 @@ fn choice(kind: TracerKind) -> DeviceSettings {
 fn gpu_one_renderer_makes_the_images_of_many() {
     let device = device();
     let scene = || builtin::by_name("cornell-box").unwrap();
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut shared = Renderer::new(device.clone(), scene(), &choice(kind)).unwrap();
         for integrator in ["ao", "path", "ao", "normals", "path"] {
             let image = shared.still(&small(integrator), &mut NoControl).unwrap().image;
@@ -58,7 +58,7 @@ fn gpu_one_renderer_makes_the_images_of_many() {
 #[test]
 fn gpu_a_still_of_pixel_centres_is_the_image_that_frames_approach() {
     let device = device();
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
         let mut image = |json: serde_json::Value| renderer.image(&settings(json), &mut NoControl).unwrap();
         let frame = image(serde_json::json!({ "image": { "size": [64, 48] }, "frames": { "preset": "reference" } }));
@@ -122,7 +122,7 @@ fn gpu_frames_are_antialiased() {
         serde_json::json!({ "frames": "0..1", "warm_up": 63, "orbit": 720 }),
         serde_json::json!({ "frames": "16..17", "warm_up": 0, "orbit": 720 }),
     ];
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
         for (at, timeline) in timelines.iter().enumerate() {
             let mut image = |frames: serde_json::Value, spp: Option<u32>| {
@@ -311,7 +311,7 @@ fn gpu_the_scene_decides_what_settings_leave_open() {
 fn gpu_ambient_occlusion_is_denoised() {
     let device = device();
     let mut reference = None;
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
         let ao = |spp: u32, denoise: Option<&str>| {
             let mut all = serde_json::json!({ "image": { "size": [96, 72], "spp": spp, "seed": spp } });
@@ -353,7 +353,7 @@ fn gpu_dissolve_is_coverage_unless_it_is_set_to_be_glass() {
     let faces = "usemtl floor\nf 1 2 3 4\nusemtl card\nf 5 6 7 8\n";
     std::fs::write(&path, format!("mtllib a.mtl\n{}{}{faces}", corners(0.0), corners(1.0))).unwrap();
     let camera = serde_json::json!({ "eye": [0, 0.5, 0], "target": [0, 0, 0], "up": [0, 0, -1] });
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let scene = skylit::scene::load::load_file(&path).unwrap();
         let mut renderer = Renderer::new(device.clone(), scene, &choice(kind)).unwrap();
         for (meaning, expected) in [(None, 1.0), (Some("glass"), 0.0), (Some("alpha"), 1.0)] {

@@ -19,6 +19,7 @@ use skylit::stress::lengths::Kerb;
 use skylit::stress::scale::{can_bake, floor_beside_sphere, places};
 use skylit::tracer::TracerKind;
 
+use crate::common;
 use crate::common::{assert_validation_clean, device, tracer, tracers};
 
 /// Largest true standard error of an image's mean: a case that does not reach it takes too few samples to say anything.
@@ -347,7 +348,7 @@ fn check_exact(
     want: f32,
     spare: impl Fn(TracerKind) -> f64,
 ) {
-    let options = options(96, 16, 1.0, f64::INFINITY);
+    let options = options(96, 16_u32.div_ceil(common::divisor()), 1.0, f64::INFINITY);
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
         let image = closed_forms::render(&tracer, scene, camera, &options, &mut NoControl)

@@ -12,7 +12,7 @@ use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
 use skylit::tracer::{Kernel, Needs, Tracer, TracerKind};
 
-use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, record, scene, tracer};
 use crate::{AoOptions, differences, oracle_image, render};
 
 /// 20 000 samples of a smooth quantity: sums in single precision would be off by some 1e-5 (each addition to a sum of 1e4
@@ -26,7 +26,7 @@ fn gpu_film_sums_are_compensated() {
     let options = AoOptions { samples: SampleSettings::new([3, 2], 20_000, 0), falloff: 1.7, ..Default::default() };
     let oracle = Oracle::new(&scene, scene.origin());
     let want = oracle_image(&oracle, &camera, &options);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, &camera, &options);
         let (_, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, 0.0);
@@ -57,7 +57,7 @@ fn gpu_film_variance_and_seeds() {
     let scene = scene("stairs");
     let camera = &scene.cameras[0];
     let options = AoOptions { samples: SampleSettings::new([64, 48], 6, 0), ..Default::default() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let first = render(&tracer, &scene, camera, &options);
         let (mut mixed, n) = (0, options.samples.spp as f64);
@@ -91,7 +91,7 @@ fn gpu_film_does_not_depend_on_batches() {
     let scene = scene("leaf-cards");
     let camera = &scene.cameras[0];
     let options = AoOptions { samples: SampleSettings::new([70, 45], 23, 0), falloff: 3.0, ..Default::default() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         // 16 + 4 + 2 + 1 samples
         let whole = render(&tracer, &scene, camera, &options);
@@ -184,7 +184,7 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
             let options = AoOptions { samples: SampleSettings::new(size, spp, 0), ..Default::default() };
             let tile_mask = TileMask::new(&flat, &record(scene, &camera, size), size, spp).map(Arc::new);
             let (live, all) = tile_mask.as_ref().map_or((1, 1), |c| c.count());
-            for kind in tracers(&device) {
+            for kind in picked(&device) {
                 let tracer = tracer(&device, kind, scene);
                 let whole = render(&tracer, scene, &camera, &options);
                 let image =

@@ -6,7 +6,7 @@ use skylit::Error;
 use skylit::film::{Control, SampleSettings};
 use skylit::integrators::{ao, aov};
 
-use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, record, scene, tracer};
 use crate::{AoOptions, render};
 
 #[test]
@@ -18,7 +18,7 @@ fn gpu_time_limit() {
         samples: SampleSettings { time_limit: Some(limit), ..SampleSettings::new([64, 64], 1 << 24, 0) },
         ..Default::default()
     };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let start = Instant::now();
         let image = render(&tracer, &scene, &scene.cameras[0], &options);
@@ -67,7 +67,7 @@ fn gpu_interruption_and_progress() {
     let camera = record(&scene, &scene.cameras[0], [64, 64]);
     let options = AoOptions { samples: SampleSettings::new([64, 64], 800, 0), ..Default::default() };
     let stopper = |questions, answer| Stopper { questions, answer, progress: Vec::new() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let mut control = stopper(9, || Err(Error::Interrupted));
         let result = ao::render(&tracer, &camera, &options, &mut control);

@@ -111,11 +111,13 @@ fn gpu_a_baseline() {
     }
     let dir = tempfile::tempdir().unwrap();
     let before = dir.path().join("before.json");
-    let args = [&["builtin:stairs", "--presets", "fast", "--parts", "still,moving"], &TINY[..]].concat();
+    let args = [&["builtin:stairs", "--presets", "fast", "--parts", "still,moving,sun"], &TINY[..]].concat();
     assert!(run(&[&args[..], &["--json", before.to_str().unwrap()]].concat()).status.success());
     let compared = [&args[..], &["--json", "--baseline", before.to_str().unwrap()]].concat();
     let out = run(&compared);
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    // occlusion does not depend on where the sun is
+    assert!(of_part(&record, "", "sun").is_empty());
     let baseline = &record["baseline"];
     // two views: three times, two errors and flicker each
     assert_eq!(
@@ -143,23 +145,22 @@ fn gpu_changes() {
     let out = run(&[
         "--quick",
         "--size",
-        "96x54",
+        "80x45",
         "--frames",
         "16",
         "--parts",
-        "change,animation",
+        "change",
         "--views",
         "near",
         "--presets",
         "larsen,fast",
         "room",
-        "builtin:parade",
         "--json",
         "--quiet",
     ]);
     assert!(out.status.success(), "{}", stderr(&out));
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(scenes(&record), ["room", "builtin:parade"]);
+    assert_eq!(scenes(&record), ["room"]);
     let of = |part: &str, preset: &str, quantity: &str| value(&record, ["room", part, preset, quantity]);
     let half_life = of("appear", "larsen", "half-life of memory");
     assert!((half_life - 1.0).abs() < 0.1, "{half_life}");
@@ -170,7 +171,6 @@ fn gpu_changes() {
     }
     assert!(of("slide", "fast", "update") > 0.0 && of("slide", "fast", "ghosting") >= 0.0);
     assert!(of("sidestep", "reference", "pixels") > 10.0 && of("sidestep", "larsen", "recovered").is_finite());
-    assert!(value(&record, ["builtin:parade", "animation", "fast", "RMSE"]) < 0.2);
 }
 
 #[test]

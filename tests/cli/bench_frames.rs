@@ -150,19 +150,3 @@ fn gpu_bounces() {
         assert!(published.len() == 4 && published.iter().all(|p| p.1 < 10.0), "{published:?}");
     }
 }
-
-/// The same code measures ambient occlusion, whose presets are more.
-#[test]
-fn gpu_ambient_occlusion() {
-    if !device() {
-        return;
-    }
-    let args = ["builtin:stairs", "--integrator", "ao", "--presets", "larsen,balanced", "--parts", "still,moving,sun"];
-    let record = record(&args);
-    let scene = "builtin:stairs, near";
-    assert_eq!(contestants(&record, scene, "still"), ["larsen", "balanced", "reference"]);
-    // occlusion does not depend on where the sun is
-    assert!(of_part(&record, scene, "sun").is_empty());
-    let rmse = value(&record, [scene, "orbit", "balanced", "RMSE"]);
-    assert!((0.0..0.2).contains(&rmse), "{rmse}");
-}

@@ -77,6 +77,20 @@ pub fn tracers(device: &Device) -> Vec<TracerKind> {
     there
 }
 
+/// The tracer of a test, which its name picks. With `SKYLIT_FULL` set, all of them.
+///
+/// Tracers share the code that shades, filters and accumulates, and what compares them asks for all ([`tracers`]). Images of tests are small, and
+/// compiling the kernels of a scene's features is what they cost on a CPU driver, for each tracer anew.
+pub fn picked(device: &Device) -> Vec<TracerKind> {
+    let all = tracers(device);
+    if is_full() {
+        return all;
+    }
+    // a test is a thread of its name
+    let name: usize = std::thread::current().name().map_or(0, |n| n.bytes().map(usize::from).sum());
+    vec![all[name % all.len()]]
+}
+
 /// What tracers of tests are asked for: normals and albedo.
 pub use skylit::stress::degenerate::NEEDS as ALL;
 

@@ -32,7 +32,7 @@ mod whitted;
 
 use std::sync::{Arc, OnceLock};
 
-use common::{assert_validation_clean, tracers};
+use common::{assert_validation_clean, picked, tracers};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::Film;
@@ -67,20 +67,6 @@ fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResul
         .unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
     assert_eq!(result.image.film.not_finite, 0, "{}: samples that are no numbers", tracer.kind());
     result
-}
-
-/// The tracer of a test, which its name picks. With `SKYLIT_FULL` set, all of them.
-///
-/// Tracers share the code that shades, and the compute tracer renders all scenes of tests/mitsuba. Images here are small, and compiling the kernels of a
-/// scene's features is what they cost on a CPU driver, for each tracer anew. What compares tracers asks for all ([`tracers`]).
-fn picked(device: &Device) -> Vec<TracerKind> {
-    let all = tracers(device);
-    if common::is_full() {
-        return all;
-    }
-    // a test is a thread of its name
-    let name: usize = std::thread::current().name().map_or(0, |n| n.bytes().map(usize::from).sum());
-    vec![all[name % all.len()]]
 }
 
 /// Holds the mean of an image that should be `expected` all over against it, on the test's tracer ([`picked`]); strategies that are for comparison on one:

@@ -10,7 +10,7 @@ use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Scene};
 use skylit::tracer::Tracer;
 
-use crate::common::{assert_validation_clean, device, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, tracer, tracers};
 
 const SIZE: [u32; 2] = [40, 32];
 
@@ -61,7 +61,7 @@ fn gpu_bent_normals_of_a_plane() {
             Camera::look_at(eye, DVec3::ZERO, DVec3::Y, 0.8)
         })
         .collect();
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         for (way, settings) in ways() {
             let (mean, worst) = compare(&settle(&tracer, &scene, &cameras, &settings), expected);
@@ -82,7 +82,7 @@ fn gpu_bent_normals_of_grooves() {
         let angle = degrees.to_radians();
         let scene = analytic::v_groove(angle, 1e4, 3e4, SceneTransform::default());
         let (s, c) = (angle * 0.5).sin_cos();
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let tracer = tracer(&device, kind, &scene);
             let mut sum = DVec3::ZERO;
             for side in [1.0, -1.0] {
@@ -111,7 +111,7 @@ fn gpu_bent_normals_of_grooves() {
 fn gpu_bent_normals_of_a_closed_box() {
     let device = device();
     let scene = analytic::closed_box(2.0, SceneTransform::default());
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let realtime = settle(&tracer, &scene, &scene.cameras[..1], &settings());
         assert!(realtime.bent().unwrap().iter().all(|b| *b == [0.0; 3]), "{kind}");

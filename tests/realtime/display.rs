@@ -14,7 +14,7 @@ use skylit::scene::builtin::{SceneTransform, analytic, by_name};
 use skylit::tracer::visits::VisitCounter;
 use skylit::tracer::{Tracer, TracerKind};
 
-use crate::common::{assert_validation_clean, device, record, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, record, tracer, tracers};
 
 const SIZE: [u32; 2] = [93, 50];
 
@@ -53,7 +53,7 @@ fn gpu_displayed_visibility_has_the_bytes_of_a_png() {
     let device = device();
     let scene = by_name("stairs").unwrap();
     let camera = record(&scene, &scene.cameras[0], SIZE);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         for preset in [Preset::Balanced, Preset::Larsen] {
             // with a falloff samples take all values
@@ -200,7 +200,7 @@ fn gpu_displayed_rays_are_those_of_the_frame() {
     let scene = by_name("stairs").unwrap();
     let camera = record(&scene, &scene.cameras[0], SIZE);
     let decoded: Vec<f32> = (0..256).map(|byte| skylit::colour::srgb_decode(byte as f32 / 255.0)).collect();
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let settings =
             Settings { rays_per_pixel: 3, resolution: Resolution::Checkerboard, ..Preset::Balanced.settings() };

@@ -11,7 +11,7 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
-use crate::common::{ALL, assert_validation_clean, device, record, tracers};
+use crate::common::{ALL, assert_validation_clean, device, picked, record};
 use crate::{SIZE, frames, mean, one_tracer, scene_of, traced, triangles};
 
 /// A floor that fills the view, and a hall around all of it, which may move away. No normal that is seen lies along z.
@@ -45,7 +45,7 @@ fn gpu_larsen_takes_half_of_the_frame_before() {
     let scene = hall();
     let away = [(1, DAffine3::from_translation(DVec3::X * 1000.0))];
     let back = [(1, DAffine3::IDENTITY)];
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut tracer = tracer(&device, kind, &scene);
         // a hit counts 1, wherever
         let mut realtime = larsen(&tracer, SIZE, 1.0, &[]);
@@ -131,7 +131,7 @@ fn gpu_larsen_traces_a_quarter_of_the_pixels_and_none_that_is_lit() {
 fn gpu_larsen_has_two_patterns_in_turn() {
     let device = device();
     let scene = hall();
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         // distances count, so that directions show
         let mut realtime = larsen(&tracer, SIZE, 1.3, &[]);

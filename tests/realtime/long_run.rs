@@ -6,7 +6,7 @@ use glam::DVec3;
 use skylit::measure::temporal::Drift;
 use skylit::realtime::Preset;
 
-use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, scene, tracer};
 use crate::{assert_sound, mean, realtime, stepped, traced};
 
 const FRAMES: &str = "SKYLIT_TEST_FRAMES";
@@ -39,7 +39,7 @@ fn gpu_ten_thousand_frames_stay_level() {
     let device = device();
     let scene = scene("stairs");
     let size = [16, 9];
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, size, &traced(Preset::Fast));
         let (mut level, mut turn, mut first) = (Vec::new(), Vec::new(), None);

@@ -1,5 +1,5 @@
-//! Ambient occlusion frame after frame: what its images must show, what it leaves out, and how it ends. Images are small; every claim is
-//! held on each tracer that the device runs, unless it says which.
+//! Ambient occlusion frame after frame: what its images must show, what it leaves out, and how it ends. Images are small; a claim is
+//! held on the tracer that its test's name picks ([`common::picked`]), and what tracers could do differently on each that the device runs.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -21,7 +21,7 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
-use crate::common::{ALL, assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::common::{ALL, assert_validation_clean, device, picked, record, scene, tracer, tracers};
 use crate::{
     NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, rmse, scene_of, stepped, traced, triangles,
 };
@@ -171,7 +171,7 @@ fn gpu_displayed_reasons_of_rejected_histories() {
     let [camera, shifted] = [0.0, 0.6].map(|x| stepped(&scene, SIZE, DVec3::new(x, 0.0, 0.0)));
     let display = Display { shown: DisplayMode::Rejected, exposure: 0.0, unit: 1.0, tone_map: ToneMap::Linear };
     let settings = Settings { antialias: false, resolution: Resolution::Full, ..traced(Preset::Fast) };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut tracer = moving(&device, kind, &scene, vec![1]);
         let [mut realtime, mut plain] = [(); 2].map(|()| realtime(&tracer, SIZE, &settings));
         realtime.display(&tracer, Some(display)).unwrap();
@@ -463,7 +463,7 @@ fn gpu_a_surface_keeps_its_history_as_it_moves() {
             * DAffine3::from_quat(DQuat::from_rotation_y(0.035 * k))
     };
     let count = 12;
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut tracer = moving(&device, kind, &scene, vec![1]);
         tracer.update(&at(place(0))).unwrap();
         let mut realtime = realtime(&tracer, SIZE, &settings);
@@ -513,7 +513,7 @@ fn gpu_an_animation_keeps_its_histories() {
     let settings = Settings { filter: NO_FILTER, moved_weight: 0.0, ..traced(Preset::Balanced) };
     let motion = rig.motion(0).unwrap();
     let camera = record(&scene, &scene.cameras[0], SIZE);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let mut tracer =
             Tracer::new(&device, kind, &FlatScene::with_motion(&scene, motion.clone()).unwrap(), ALL).unwrap();
         let mut realtime = realtime(&tracer, SIZE, &settings);

@@ -7,8 +7,8 @@ use skylit::scene::Projection;
 use skylit::tracer::TracerKind;
 
 use crate::common::{
-    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, is_full, record, scene, tracer,
-    tracers,
+    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, is_full, picked, record, scene,
+    tracer,
 };
 use crate::{NO_FILTER, SIZE, assert_sound, bits, frames, realtime, rmse, stepped, traced};
 
@@ -27,7 +27,7 @@ fn gpu_an_image_at_rest_is_denoised_and_converges() {
     frames(&mut truth, &quick, &camera, 64);
     let truth = truth.result().unwrap();
     let all = vec![1.0; truth.len()];
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let errors = [(holding, 64), (converging, 10), (converging, 64)].map(|(settings, count)| {
             let mut realtime = realtime(&tracer, SIZE, &settings);
@@ -51,7 +51,7 @@ fn gpu_the_first_frames_at_rest_are_filtered_as_others() {
     let scene = scene("stairs");
     let camera = stepped(&scene, SIZE, DVec3::ZERO);
     let holding = Settings { antialias: true, ..traced(Preset::Balanced) };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let images = [false, true].map(|converge| {
             let mut realtime = realtime(&tracer, SIZE, &Settings { converge, ..holding });
@@ -86,7 +86,7 @@ fn gpu_long_frames_at_rest_converge_to_what_short_ones_do() {
         // the mean over places within the pixels
         frames(&mut truth, &quick, &camera, 64);
         let (truth, all) = (truth.result().unwrap(), vec![1.0; pixels as usize]);
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let tracer = tracer(&device, kind, &scene);
             for settings in [settings, Settings { resolution: Resolution::Half, ..settings }] {
                 // what is seen is one image on all tracers; the other cases on one of them
@@ -122,7 +122,7 @@ fn gpu_long_frames_do_not_depend_on_launches() {
     let device = device();
     let scene = scene("stairs");
     let camera = stepped(&scene, SIZE, DVec3::ZERO);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let settings = Settings { antialias: true, converge: true, ..traced(Preset::Balanced) };
         let images = [settings.launch_rays, 1000].map(|launch_rays| {
@@ -144,7 +144,7 @@ fn gpu_samples_at_rest_are_histories_in_motion() {
     let settings = Settings { filter: NO_FILTER, converge: true, ..traced(Preset::Balanced) };
     let quick = tracer(&device, TracerKind::Compute, &scene);
     let truth = crate::reference(&quick, SIZE, &settings, &moved);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let errors = [(true, 3), (true, 30), (false, 30)].map(|(converge, at_rest)| {
             let mut realtime = realtime(&tracer, SIZE, &Settings { converge, ..settings });
@@ -168,7 +168,7 @@ fn gpu_interrupted_frames_leave_histories() {
     let device = device();
     let scene = scene("stairs");
     let cameras = [0.0, 0.01, 0.02].map(|x| stepped(&scene, SIZE, DVec3::X * x));
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let settings = Settings { antialias: true, converge: true, launch_rays: 30_000, ..traced(Preset::Fast) };
         let make = || realtime(&tracer, SIZE, &settings);
@@ -192,7 +192,7 @@ fn gpu_an_interrupted_image_converges() {
     let mut truth = realtime(&quick, SIZE, &many);
     frames(&mut truth, &quick, &camera, 64);
     let (truth, all) = (truth.result().unwrap(), vec![1.0; (SIZE[0] * SIZE[1]) as usize]);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let errors = [false, true].map(|is_interrupted| {
             let mut realtime = realtime(&tracer, SIZE, &settings);
@@ -223,7 +223,7 @@ fn gpu_an_image_continues_in_another_size() {
     let device = device();
     let scene = scene("stairs");
     let half = SIZE.map(|n| n / 2);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let settings = Settings { antialias: true, converge: true, bent: true, ..traced(Preset::Fast) };
         let at_rest = |size: [u32; 2], seed, step, count| {

@@ -8,7 +8,7 @@ use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection};
 use skylit::tracer::TracerKind;
 
-use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, record, scene, tracer, tracers};
 use crate::{NO_FILTER, SIZE, assert_sound, frames, mean, one_tracer, realtime, reference, rmse, stepped, traced};
 
 #[test]
@@ -62,7 +62,7 @@ fn gpu_bad_settings_and_too_many_rays_are_refused() {
 fn gpu_images_of_any_size() {
     let device = device();
     let scene = scene("cornell-box");
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         for size in [[1, 1], [7, 5], [1, 17], [33, 1]] {
             let all = [
@@ -129,7 +129,7 @@ fn gpu_orthographic_cameras_keep_their_histories() {
 fn gpu_rays_of_one_frame_or_of_many_are_the_same_rays() {
     let device = device();
     let scene = scene("stairs");
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         // any hit, and nearest hits
         let falloffs = if kind == TracerKind::Compute { &[1.0, 5.0][..] } else { &[5.0] };

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use skylit::realtime::{Preset, Resolution, Settings, Technique};
 
-use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::common::{assert_validation_clean, device, picked, scene, tracer};
 use crate::{SIZE, bits, frames, realtime, stepped, traced};
 
 fn covered(realtime: &skylit::realtime::Realtime) -> u64 {
@@ -18,7 +18,7 @@ fn gpu_an_antialiased_image_comes_to_rest() {
     let pixels = u64::from(SIZE[0] * SIZE[1]);
     let still = stepped(&scene, SIZE, DVec3::ZERO);
     let moved = stepped(&scene, SIZE, DVec3::X * 0.01);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let settings = Settings { history: 8, antialias: true, ..traced(Preset::Fast) };
         let mut realtime = realtime(&tracer, SIZE, &settings);
@@ -50,7 +50,7 @@ fn gpu_what_has_not_moved_is_not_traced_again() {
     let pixels = u64::from(SIZE[0] * SIZE[1]);
     let still = stepped(&scene, SIZE, DVec3::ZERO);
     let moved = stepped(&scene, SIZE, DVec3::X * 0.01);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         for (history, rays, rest) in [(8, 1, true), (3, 4, true), (4, 1, false)] {
             let settings = Settings { history, rays_per_pixel: rays, rest, ..traced(Preset::Fast) };
@@ -91,7 +91,7 @@ fn gpu_parts_of_the_pixels_are_traced_in_turn() {
     let scene = scene("stairs");
     // odd sides: the parts are not of one size
     let size = [61, 35];
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         for resolution in Resolution::ALL {
             for rays in [1, 5] {
@@ -139,7 +139,7 @@ fn gpu_the_screen_space_technique_traces_no_occlusion_ray() {
     let device = device();
     let scene = scene("stairs");
     let settings = Settings { technique: Technique::Gtao, ..traced(Preset::Fast) };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, SIZE, &settings);
         let stats = frames(&mut realtime, &tracer, &stepped(&scene, SIZE, DVec3::ZERO), 3);

@@ -181,7 +181,8 @@ fn gpu_other_vector_widths_hold() {
         return println!("skipped: {} has no vector width to choose", device.info.name);
     }
     let dir = folder();
-    for width in ["128", "256", "512"] {
+    // the widest is that of this device, if its processor has such vectors
+    for width in if common::is_full() { &["128", "256", "512"][..] } else { &["128", "256"] } {
         let out = command::skylit(&["verify", dir.path().to_str().unwrap(), "--json"])
             .env("LP_NATIVE_VECTOR_WIDTH", width)
             .output()
