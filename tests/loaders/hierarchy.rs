@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::{DAffine3, DVec3, Vec3};
 use serde_json::json;
+use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::{LightKind, Projection, Scene};
 
 use crate::build::*;
@@ -177,7 +178,94 @@ fn punctual_lights() {
 #[test]
 fn what_is_not_shown_is_said() {
     let mut doc = Doc::triangle();
-    doc.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    doc.json["extensionsUsed"] = json!(["EXT_lights_ies"]);
     let warnings = doc.load().report.warnings.join("; ");
-    assert!(warnings.contains("EXT_mesh_gpu_instancing"), "{warnings}");
+    assert!(warnings.contains("EXT_lights_ies"), "{warnings}");
+}
+
+/// A node whose instances have these accessors.
+fn instanced(doc: &mut Doc, attributes: serde_json::Value) {
+    doc.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    doc.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+}
+
+#[test]
+fn nodes_place_their_mesh_many_times() {
+    let mut doc = Doc::triangle();
+    doc.json["nodes"][0]["translation"] = json!([10, 0, 0]);
+    let translation = doc.accessor(&bytes(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0f32]]), F32, "VEC3", 3);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turns = bytes(&[[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half], [0.0, 0.0, 0.0, 2.0f32]]);
+    let rotation = doc.accessor(&turns, F32, "VEC4", 3);
+    let scale = doc.accessor(&bytes(&[[1.0; 3], [2.0, 1.0, 1.0], [0.5f32; 3]]), F32, "VEC3", 3);
+    instanced(&mut doc, json!({ "TRANSLATION": translation, "ROTATION": rotation, "SCALE": scale, "_ID": 99 }));
+    let scene = doc.load();
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    assert_eq!((scene.instances.len(), scene.meshes.len()), (3, 1));
+    // the corner (1, 0, 0) of each
+    let corners: Vec<DVec3> = scene.instances.iter().map(|i| i.object_to_world.transform_point3(DVec3::X)).collect();
+    let expected = [DVec3::new(12.0, 0.0, 0.0), DVec3::new(10.0, 4.0, 0.0), DVec3::new(10.5, 0.0, 3.0)];
+    assert!(corners.iter().zip(expected).all(|(a, b)| a.distance(b) < 1e-6), "{corners:?}");
+
+    // rotations alone, of bytes
+    let mut doc = Doc::triangle();
+    let rotation = doc.accessor(&[0, 0, 127, 0, 0, 0, 0, 127], I8, "VEC4", 2);
+    doc.json["accessors"][rotation]["normalized"] = json!(true);
+    instanced(&mut doc, json!({ "ROTATION": rotation }));
+    let scene = doc.load();
+    let corner = scene.instances[0].object_to_world.transform_point3(DVec3::X);
+    assert!(corner.distance(DVec3::NEG_X) < 1e-6 && scene.instances.len() == 2, "{corner}");
+}
+
+#[test]
+fn instances_that_do_not_fit_are_told() {
+    let mut doc = Doc::triangle();
+    let two = doc.accessor(&bytes(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0f32]]), F32, "VEC3", 2);
+    let three = doc.accessor(&bytes(&[[1.0; 3]; 3]), F32, "VEC3", 3);
+    let broken = doc.accessor(&bytes(&[[f32::NAN; 3]; 2]), F32, "VEC3", 2);
+    for (attributes, text) in [
+        (json!({ "TRANSLATION": two, "SCALE": three }), "3 elements, not 2"),
+        (json!({ "TRANSLATION": two, "ROTATION": two }), "type VEC3 where VEC4 is needed"),
+        (json!({ "TRANSLATION": 77 }), "accessor 77 does not exist"),
+        (json!({ "TRANSLATION": broken }), "instance 0 is not finite"),
+        (json!([]), "is not valid"),
+    ] {
+        instanced(&mut doc, attributes);
+        let error = doc.error();
+        assert!(error.contains("node 0") && error.contains(text), "{text}: {error}");
+    }
+}
+
+/// Instances of a node that moves move with it.
+#[test]
+fn instances_follow_animations() {
+    let mut doc = Doc::triangle();
+    let translation = doc.accessor(&bytes(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0f32]]), F32, "VEC3", 2);
+    instanced(&mut doc, json!({ "TRANSLATION": translation }));
+    let times = doc.accessor(&bytes(&[[0.0], [1.0f32]]), F32, "SCALAR", 2);
+    let places = doc.accessor(&bytes(&[[0.0; 3], [0.0, 0.0, 8.0f32]]), F32, "VEC3", 2);
+    let sampler = json!({ "input": times, "output": places });
+    let channel = json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } });
+    doc.push("animations", json!({ "samplers": [sampler], "channels": [channel] }));
+    let scene = doc.load();
+    let mut pose = Pose::default();
+    scene.rig.as_ref().unwrap().pose(0, 0.5, Playback::Once, &mut pose).unwrap();
+    let places: Vec<DVec3> = pose.instances.iter().map(|(_, to_world)| to_world.translation).collect();
+    assert_eq!(places, [DVec3::new(1.0, 0.0, 4.0), DVec3::new(0.0, 2.0, 4.0)]);
+}
+
+#[test]
+fn hidden_nodes_are_left_out() {
+    let mut doc = Doc::triangle();
+    doc.json["extensionsUsed"] = json!(["KHR_node_visibility", "KHR_lights_punctual"]);
+    doc.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point" }] } });
+    let hidden = json!({ "KHR_node_visibility": { "visible": false } });
+    let lamp = json!({ "KHR_lights_punctual": { "light": 0 } });
+    doc.json["scenes"][0]["nodes"] = json!([0, 1, 3]);
+    doc.push("nodes", json!({ "mesh": 0, "children": [2], "extensions": hidden }));
+    doc.push("nodes", json!({ "mesh": 0, "extensions": lamp }));
+    doc.push("nodes", json!({ "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": true } } }));
+    let scene = doc.load();
+    assert_eq!((scene.instances.len(), scene.lights.len()), (2, 0));
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
 }

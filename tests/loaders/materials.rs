@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
-use skylit::scene::material::{AlphaMode, Material};
+use skylit::scene::material::{AlphaMode, Material, TextureSlot};
 use skylit::scene::{Filter, Scene, TexelData, Wrap};
 
 use crate::build::*;
@@ -50,6 +50,57 @@ fn core() {
     assert_eq!(texture.texels.as_bytes()[..4], [2, 2, 3, 4]);
     assert_eq!(m.metallic_roughness_texture.unwrap().texcoord, 1);
     assert_eq!(m.occlusion_texture.unwrap().texture, m.metallic_roughness_texture.unwrap().texture);
+}
+
+/// The older extension is the newer ones with an index of refraction of 0: one material.
+#[test]
+fn specular_and_glossiness() {
+    let older = |factor: f32| {
+        with_material(json!({ "pbrMetallicRoughness": { "metallicFactor": 1, "baseColorTexture": { "index": 1 } },
+            "extensions": { "KHR_materials_pbrSpecularGlossiness": {
+                "diffuseFactor": [0.1, 0.2, 0.3, 0.4], "diffuseTexture": { "index": 2 }, "specularFactor": [0.5, 0.6, 0.7],
+                "glossinessFactor": factor, "specularGlossinessTexture": { "index": 0, "texCoord": 1 },
+            } } }))
+        .load()
+    };
+    let newer = with_material(json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "baseColorTexture": { "index": 2 }, "metallicFactor": 0 },
+        "extensions": { "KHR_materials_ior": { "ior": 0 }, "KHR_materials_specular": {
+            "specularColorFactor": [0.5, 0.6, 0.7], "specularColorTexture": { "index": 0, "texCoord": 1 },
+        } } }))
+    .load();
+    let scene = older(1.0);
+    let (a, b) = (material(&scene), material(&newer));
+    assert_eq!((a.base_color, a.metallic, a.roughness, a.ior), (b.base_color, b.metallic, b.roughness, b.ior));
+    assert_eq!((a.specular.factor, a.specular.color), (b.specular.factor, b.specular.color));
+    let image = |scene: &Scene, slot: Option<TextureSlot>| {
+        let slot = slot.unwrap();
+        (scene.textures[slot.texture].name.clone(), slot.texcoord)
+    };
+    assert_eq!(image(&scene, a.base_color_texture), image(&newer, b.base_color_texture));
+    assert_eq!(image(&scene, a.specular.color_texture), image(&newer, b.specular.color_texture));
+
+    // alpha 4 of 255 is glossiness
+    let roughness = |scene: &Scene| {
+        let slot = material(scene).metallic_roughness_texture.unwrap();
+        assert_eq!(slot.texcoord, 1);
+        scene.textures[slot.texture].texels.get(0)[1]
+    };
+    assert_eq!(roughness(&scene), 251.0 / 255.0);
+    assert!((roughness(&older(0.5)) - (1.0 - 2.0 / 255.0)).abs() < 1e-5);
+
+    // without a texture, and without anything
+    let plain = |glossiness: Value| {
+        let scene =
+            with_material(json!({ "extensions": { "KHR_materials_pbrSpecularGlossiness": glossiness } })).load();
+        (
+            material(&scene).roughness,
+            material(&scene).specular.color,
+            material(&scene).metallic_roughness_texture.is_some(),
+        )
+    };
+    assert_eq!(plain(json!({ "glossinessFactor": 0.75 })), (0.25, Vec3::ONE, false));
+    assert_eq!(plain(json!({})), (0.0, Vec3::ONE, false));
 }
 
 #[test]

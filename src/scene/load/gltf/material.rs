@@ -10,11 +10,12 @@ use glam::{Affine2, Mat2, Vec2, Vec3, Vec4};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
+use super::glossiness::{RoughnessTexture, SpecularGlossiness};
 use super::values::{text, valid};
 use crate::scene::material::{AlphaMode, Anisotropy, Clearcoat, Material, Sheen, Specular, TextureSlot, Transmission};
 
 /// The extensions that the crate does not model; their names come with them.
-trait UnmodelledExtension: Default + for<'a> Deserialize<'a> {
+pub(super) trait UnmodelledExtension: Default + for<'a> Deserialize<'a> {
     const NAME: &str;
 
     /// Reads it from the extensions of an object, with its default where it is absent.
@@ -89,7 +90,7 @@ fn make_slot(texture: usize, texcoord: u32, transform: Option<&TextureTransform>
     }
 }
 
-fn slot(info: &Option<Info>) -> Option<TextureSlot> {
+pub(super) fn slot(info: &Option<Info>) -> Option<TextureSlot> {
     let info = info.as_ref()?;
     let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
     Some(make_slot(info.index.value(), info.tex_coord, transform))
@@ -110,20 +111,25 @@ fn occlusion_slot(info: &Option<json::OcclusionTexture>) -> Result<Option<Textur
 /// Material of a primitive that names none.
 pub(super) fn default_material() -> Material {
     // without extensions nothing can fail
-    convert(&json::Material::default()).unwrap_or_default()
+    convert(&json::Material::default(), 0, &mut Vec::new()).unwrap_or_default()
 }
 
-/// The scene's material, whose slots still hold indices of glTF textures.
+/// The scene's material, whose slots still hold indices of glTF textures, of which there are
+/// `textures`, or of textures that are to be made, which follow them.
 ///
 /// # Errors
 /// What is wrong with an extension, in words.
-pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
+pub(super) fn convert(
+    material: &json::Material,
+    textures: usize,
+    made: &mut Vec<RoughnessTexture>,
+) -> Result<Material, String> {
     let pbr = &material.pbr_metallic_roughness;
     let extensions = material.extensions.as_ref();
     let others = extensions.map(|e| &e.others);
     let strength = extensions.and_then(|e| e.emissive_strength.as_ref()).map_or(1.0, |e| e.emissive_strength.0);
     let specular = extensions.and_then(|e| e.specular.as_ref());
-    Ok(Material {
+    let mut out = Material {
         name: text(&material.name).to_owned(),
         base_color: Vec4::from(pbr.base_color_factor.0),
         base_color_texture: slot(&pbr.base_color_texture),
@@ -153,7 +159,13 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         anisotropy: AnisotropyJson::from_extensions(others)?.to_scene(),
         parameters: parameters(material),
         ..Material::default()
-    })
+    };
+
+    // it stands for base colour, metalness and roughness
+    if others.is_some_and(|e| e.contains_key(SpecularGlossiness::NAME)) {
+        SpecularGlossiness::from_extensions(others)?.apply(&mut out, textures, made);
+    }
+    Ok(out)
 }
 
 /// Numbers among the material's `extras`.

@@ -14,6 +14,8 @@ mod animation;
 mod compressed;
 mod container;
 mod decoded;
+mod glossiness;
+mod instancing;
 mod material;
 mod mesh;
 mod node;
@@ -41,6 +43,7 @@ use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
 
 /// Extensions that skylit reads, and whether this program was built with what they need.
 const KNOWN: &[(&str, bool)] = &[
+    ("EXT_mesh_gpu_instancing", true),
     ("EXT_meshopt_compression", cfg!(feature = "meshopt")),
     ("EXT_texture_webp", true),
     ("KHR_draco_mesh_compression", cfg!(feature = "draco")),
@@ -49,6 +52,7 @@ const KNOWN: &[(&str, bool)] = &[
     ("KHR_materials_clearcoat", true),
     ("KHR_materials_emissive_strength", true),
     ("KHR_materials_ior", true),
+    ("KHR_materials_pbrSpecularGlossiness", true),
     ("KHR_materials_sheen", true),
     ("KHR_materials_specular", true),
     ("KHR_materials_transmission", true),
@@ -56,6 +60,7 @@ const KNOWN: &[(&str, bool)] = &[
     ("KHR_materials_volume", true),
     ("KHR_mesh_quantization", true),
     ("KHR_meshopt_compression", cfg!(feature = "meshopt")),
+    ("KHR_node_visibility", true),
     ("KHR_texture_basisu", cfg!(feature = "ktx2")),
     ("KHR_texture_transform", true),
 ];
@@ -79,10 +84,15 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
 
     let mut warnings = Vec::new();
 
-    let material = |(i, m)| material::convert(m).map_err(|e| Error::input(path, format!("material {i}: {e}")));
-    scene.materials = document.materials.iter().enumerate().map(material).collect::<Result<_>>()?;
+    // materials, and the textures that they use
+    let mut made = Vec::new();
+    let textures = document.textures.len();
+    let mut material = |(i, m)| {
+        material::convert(m, textures, &mut made).map_err(|e| Error::input(path, format!("material {i}: {e}")))
+    };
+    scene.materials = document.materials.iter().enumerate().map(&mut material).collect::<Result<_>>()?;
     (scene.textures, scene.report.skipped_images) =
-        texture::resolve(&reader, path, &mut scene.materials, loading, &mut |w| warnings.push(w));
+        texture::resolve(&reader, path, &mut scene.materials, &made, loading, &mut |w| warnings.push(w));
 
     // nodes, and what they carry
     let input = |e| Error::input(path, e);
@@ -91,13 +101,26 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
         let name = text(&node.name);
-        if let Some(index) = node.mesh {
+        if let Some(index) = node.mesh.filter(|_| placed.visible) {
+            let copies = instancing::read(&reader, node).map_err(|e| input(format!("node {}: {e}", placed.node)))?;
+            if node.skin.is_some() && instancing::is_instanced(node) {
+                warnings.push(format!("node {} has instances and a skin: shown once", placed.node));
+            }
             let wanted = stage.wanted(at, index.value()).map_err(input)?;
             for made in meshes.read_mesh(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
                 // the node's transform does not apply to a skinned mesh
-                let object_to_world = made.anchor.map_or(placed.to_world, DAffine3::from_translation);
-                scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
-                stage.instances.push(made.anchor.is_none().then_some(at));
+                let places = match (&copies, made.anchor) {
+                    (Some(copies), None) => {
+                        let place = |copy: &DAffine3| (placed.to_world * *copy, stage.carrier_of_copy(at, copy));
+                        copies.iter().map(place).collect()
+                    }
+                    (_, None) => vec![(placed.to_world, Some(at))],
+                    (_, Some(anchor)) => vec![(DAffine3::from_translation(anchor), None)],
+                };
+                for (object_to_world, carrier) in places {
+                    scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
+                    stage.instances.push(carrier);
+                }
             }
         }
         if let Some(index) = node.camera {
@@ -109,7 +132,8 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }
         }
-        if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
+        let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        if let Some(light) = light.filter(|_| placed.visible) {
             match node::light(&document, placed, light.light.value()) {
                 Ok(light) => {
                     scene.lights.push(light);

@@ -65,6 +65,9 @@ pub(super) struct PlacedNode {
     pub to_world: DAffine3,
     /// Whether the node belongs to the scene that is loaded.
     pub shown: bool,
+    /// Whether neither it nor a node above it is hidden (`KHR_node_visibility`), which its mesh
+    /// and light are then.
+    pub visible: bool,
 }
 
 /// Every node of the scene with its world transform, parents before children, in the order of the
@@ -124,7 +127,8 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
                 return Err(format!("node {i} has a transform that is not finite"));
             }
             let index = placed.len();
-            placed.push(PlacedNode { node: i, parent, local, to_world, shown });
+            let visible = above.is_none_or(|p| p.visible) && !is_hidden(node);
+            placed.push(PlacedNode { node: i, parent, local, to_world, shown, visible });
             stack.extend(children(node).rev().map(|c| (c, Some(index))));
         }
     }
@@ -134,6 +138,12 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
         return Err(format!("node {i} is its own ancestor"));
     }
     Ok(placed)
+}
+
+/// Returns true if a node says that it and all below it are not to be seen.
+fn is_hidden(node: &Node) -> bool {
+    let visibility = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+    visibility.and_then(|v| v.get("visible")?.as_bool()) == Some(false)
 }
 
 fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {

@@ -140,6 +140,17 @@ impl<'a> RigBuilder<'a> {
         }
     }
 
+    /// The node that carries a copy of what placed node `at` shows: one of its own below that node
+    /// if it moves; none if it never does.
+    pub fn carrier_of_copy(&mut self, at: usize, copy: &DAffine3) -> Option<usize> {
+        if !self.moves[at] {
+            return None;
+        }
+        let local = LocalTransform::Matrix(*copy);
+        self.nodes.push(Node { name: String::new(), parent: Some(at), local, weights: Vec::new() });
+        Some(self.nodes.len() - 1)
+    }
+
     /// The variant of mesh `mesh` on placed node `at`.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use ::gltf::json::{self, Index, Root};
 use rayon::prelude::*;
 
 use super::accessor::Reader;
+use super::glossiness::RoughnessTexture;
 use super::values::{text, valid};
 use super::{container, uri};
 use crate::scene::load::options::{ImagesDecoded, Loading};
@@ -21,11 +22,13 @@ use crate::scene::{Filter, Material, Texture, Wrap};
 ///
 /// A texture whose image is missing or broken leaves its slot, with a warning: for every slot that
 /// is the same as a texture that changes nothing. So does every image if the options leave them
-/// out; their number is returned, too.
+/// out; their number is returned, too. `made`: textures that are made of others, whose indices
+/// follow those of the file's.
 pub(super) fn resolve(
     reader: &Reader,
     path: &Path,
     materials: &mut [Material],
+    made: &[RoughnessTexture],
     loading: Loading,
     warn: &mut dyn FnMut(String),
 ) -> (Vec<Texture>, usize) {
@@ -36,7 +39,10 @@ pub(super) fn resolve(
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
         used.insert(slot.texture, None);
     }
-    let image_of = |texture: usize| document.textures.get(texture).and_then(source);
+    let count = document.textures.len();
+    let made = |texture: usize| texture.checked_sub(count).and_then(|k| made.get(k));
+    let of_file = |texture: usize| made(texture).map_or(texture, |m| m.texture);
+    let image_of = |texture: usize| document.textures.get(of_file(texture)).and_then(source);
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
@@ -66,7 +72,7 @@ pub(super) fn resolve(
     }
     let mut textures = Vec::new();
     for (&index, place) in &mut used {
-        let Some(texture) = document.textures.get(index) else {
+        let Some(texture) = document.textures.get(of_file(index)) else {
             warn(format!("texture {index} does not exist: shown without it"));
             continue;
         };
@@ -85,7 +91,7 @@ pub(super) fn resolve(
             name: name.to_owned(),
             width: picture.width,
             height: picture.height,
-            texels: picture.texels.clone(),
+            texels: made(index).map_or_else(|| picture.texels.clone(), |m| m.make(picture)),
             wrap,
             filter,
         });
