@@ -149,7 +149,7 @@ fn gpu_changes() {
         "--frames",
         "16",
         "--parts",
-        "change",
+        "change,animation",
         "--views",
         "near",
         "--presets",
