@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use super::settings::{DEFAULT_SIZE, options_text, size_of_aspect};
+use super::survey::own_light::{self, OwnLight};
 use super::survey::radius::{CLOSED, TARGET};
 use super::survey::{Survey, framing, light, radius, significant};
 use super::{RenderSettings, Renderer};
@@ -108,16 +109,25 @@ impl Renderer {
         }
 
         // light
-        if is_default && needs_light && (self.lighting.is_automatic || self.scene.is_dark()) {
+        let needs_light = is_default && needs_light;
+        let own_light = match self.lighting.own_light {
+            None if needs_light && !self.lighting.is_automatic => Some(own_light::in_view(&survey, &camera, aspect)?),
+            known => known,
+        };
+        let is_dark = own_light.is_none_or(|own| own != OwnLight::ShowsView);
+        if needs_light && is_dark {
             let (lighting, words) = light::choose(&survey, &camera, aspect)?;
             let options = options_text(&RenderSettings { lighting: lighting.clone(), ..Default::default() });
-            choices.push(format!(
-                "light: the scene has none and gets {words} ({options}); --environment none leaves it dark"
-            ));
+            let why = match own_light {
+                Some(OwnLight::LeavesBlack) => "what the scene has leaves the view black, and it gets",
+                _ => "the scene has none and gets",
+            };
+            choices.push(format!("light: {why} {words} ({options}); --environment none leaves it dark"));
             chosen.lighting = lighting.clone();
             self.light(&lighting)?;
             self.lighting.is_automatic = true;
         }
+        self.lighting.own_light = own_light;
         Ok(Completed { camera, settings, chosen, choices })
     }
 

@@ -53,6 +53,7 @@ use crate::scene::load::{self, LoadOptions};
 use crate::scene::{Environment, Scene, SceneSettings};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
+use survey::own_light::OwnLight;
 
 pub use complete::{CHOSEN, Completed};
 pub use frames::{FrameOutput, Frames};
@@ -102,8 +103,10 @@ struct Lighting {
     /// Lengths of the scene's own lists before: lights, materials, meshes, instances and warnings.
     own: [usize; 5],
     environment: Option<Environment>,
-    /// It was chosen because the scene has none.
+    /// It was chosen because the scene has none that shows it.
     is_automatic: bool,
+    /// How much of a view the scene's own light shows, of the first camera, once that is known.
+    own_light: Option<OwnLight>,
 }
 
 impl Renderer {
@@ -265,7 +268,8 @@ impl Renderer {
         let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len(), s.report.warnings.len()];
         let environment = Some(s.environment.clone());
         settings.apply(s)?;
-        self.lighting = Lighting { settings: settings.clone(), own, environment, is_automatic: false };
+        let settings = settings.clone();
+        self.lighting = Lighting { settings, own, environment, is_automatic: false, own_light: before.own_light };
         Ok(())
     }
 }

@@ -29,9 +29,7 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     };
     // above the camera, so that there are shadows; the first direction is upwards
     let lamp = rounded(eye + DVec3::Y * (0.5 * walls[0]), survey.diagonal());
-    let [columns, rows] = VIEW;
-    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
-    let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
+    let views = views(camera, aspect);
     let mut seen = survey.trace(&views)?;
     clip(camera, &views, &mut seen);
     // irradiance of each surface by a lamp of one candela, without shadows, and its reflectance
@@ -56,8 +54,15 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     Ok((LightingSettings { light: vec![parse(&text)?], ..Default::default() }, "a lamp above the camera".into()))
 }
 
+/// Rays through an image.
+pub(super) fn views(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
+    let [columns, rows] = VIEW;
+    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
+    (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
+}
+
 /// About how much light a material reflects, at most 0.9; half of its colour if it has a texture.
-fn reflectance(material: &Material) -> f64 {
+pub(super) fn reflectance(material: &Material) -> f64 {
     let colour = material.base_color.truncate().dot(glam::Vec3::new(0.2126, 0.7152, 0.0722));
     let texture = if material.base_color_texture.is_some() { 0.5 } else { 1.0 };
     f64::from(colour * texture).clamp(0.0, 0.9)

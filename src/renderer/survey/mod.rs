@@ -2,6 +2,7 @@
 
 pub mod framing;
 pub mod light;
+pub mod own_light;
 pub mod radius;
 pub mod rays;
 
