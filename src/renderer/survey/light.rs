@@ -62,7 +62,7 @@ pub(super) fn views(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
 }
 
 /// About how much light a material reflects, at most 0.9; half of its colour if it has a texture.
-pub(super) fn reflectance(material: &Material) -> f64 {
+fn reflectance(material: &Material) -> f64 {
     let colour = material.base_color.truncate().dot(glam::Vec3::new(0.2126, 0.7152, 0.0722));
     let texture = if material.base_color_texture.is_some() { 0.5 } else { 1.0 };
     f64::from(colour * texture).clamp(0.0, 0.9)

@@ -164,7 +164,7 @@ impl<'a> Reader<'a> {
     pub(super) fn buffer_range(&self, buffer: usize, offset: u64, length: u64) -> Result<&'a [u8], String> {
         let bytes =
             self.buffers.get(buffer).ok_or_else(|| format!("refers to buffer {buffer}, which does not exist"))?;
-        let bytes = bytes.as_ref().map_err(|e| format!("cannot be read: {e}"))?;
+        let bytes = bytes.as_ref().map_err(|e| format!("has no bytes: {e}"))?;
         // the declared length counts, not the padding that may follow
         let declared = self.document.buffers[buffer].byte_length.0.min(bytes.len() as u64);
         match offset.checked_add(length) {
