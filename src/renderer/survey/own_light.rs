@@ -102,7 +102,7 @@ fn shows_view(survey: &Survey, camera: &Camera, aspect: f64) -> Result<bool> {
 struct Emission {
     /// Mean luminance.
     mean: f64,
-    /// Share of it that is bright enough to be seen.
+    /// Share of its surface that is bright enough to be seen.
     bright: f64,
 }
 
@@ -266,7 +266,7 @@ impl Emitters {
         let direction = to_light / distance.max(1e-30);
         let facing = if both { outwards.dot(direction).abs() } else { -outwards.dot(direction) };
         let cosine = normal.dot(direction);
-        // a surface beside an emitter would have all of the light of the view
+        // a point of the emitter itself has no distance
         let reach = (distance * distance).max(1e-30);
         (cosine > 0.0 && facing > 0.0).then(|| (direction, distance, total * cosine * facing / reach))
     }
