@@ -1,10 +1,70 @@
 //! Elements that meshoptimizer packed, by the crate `meshopt`, whose decoders are safe with any
 //! bytes.
 
-use super::meshopt::{CompressedView, Filter, Mode};
+use serde::Deserialize;
+
+use super::meshopt::extension;
+use crate::scene::load::gltf::accessor::Reader;
+
+/// Content of the extension of a buffer view.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct CompressedView {
+    /// Index of the buffer with the compressed bytes.
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: u64,
+    byte_length: u64,
+    /// Bytes of an element.
+    byte_stride: usize,
+    /// Number of elements.
+    count: u64,
+    mode: Mode,
+    #[serde(default)]
+    filter: Filter,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+enum Mode {
+    Attributes,
+    Triangles,
+    Indices,
+}
+
+/// The step that turns decoded elements into those of accessors.
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "UPPERCASE")]
+enum Filter {
+    #[default]
+    None,
+    Octahedral,
+    Quaternion,
+    Exponential,
+    Color,
+}
+
+/// Decodes a compressed buffer view.
+pub(super) fn decode(reader: &Reader, view: usize) -> Result<Vec<u8>, String> {
+    let (name, value) = extension(reader.document, view).ok_or("is not compressed")?;
+    let fail = |e: String| format!("buffer view {view} ({name}) {e}");
+    let compressed: CompressedView =
+        serde_json::from_value(value.clone()).map_err(|e| fail(format!("is not valid: {e}")))?;
+    let (offset, length) = (compressed.byte_offset, compressed.byte_length);
+    let bytes = reader.buffer_range(compressed.buffer, offset, length).map_err(fail)?;
+
+    // decoded bytes can be a thousand times as many
+    let size = compressed.count.saturating_mul(compressed.byte_stride as u64);
+    reader.budget.take(size, || format!("a compressed buffer view of {} elements", compressed.count)).map_err(fail)?;
+    let declared = reader.document.buffer_views[view].byte_length.0;
+    if size < declared {
+        return Err(fail(format!("has {size} bytes where {declared} are declared")));
+    }
+    elements(bytes, &compressed).map_err(fail)
+}
 
 /// Decoded and filtered elements of a view.
-pub(super) fn decode(bytes: &[u8], view: &CompressedView) -> Result<Vec<u8>, String> {
+fn elements(bytes: &[u8], view: &CompressedView) -> Result<Vec<u8>, String> {
     let count = usize::try_from(view.count).map_err(|_| "has too many elements".to_owned())?;
     let stride = view.byte_stride;
     let broken = |_| "holds broken data".to_owned();

@@ -13,6 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::Root;
 use ::gltf::json::mesh::Primitive;
+#[cfg(any(feature = "draco", feature = "meshopt"))]
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -26,14 +27,25 @@ pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Decodes what is compressed in a file. `reader` has nothing decoded yet.
 pub(super) fn decode(reader: &Reader) -> Decoded {
-    let compressed: Vec<usize> =
-        (0..reader.document.buffer_views.len()).filter(|&i| meshopt::is_compressed(reader.document, i)).collect();
-    let views = compressed.into_par_iter().map(|i| (i, meshopt::decode(reader, i))).collect();
+    let views = decode_views(reader);
     let mut decoded = Decoded { views, accessors: BTreeMap::new() };
 
     // Draco's streams may lie in views that were compressed again
     decoded.accessors = decode_primitives(&Reader { decoded: &decoded, ..*reader });
     decoded
+}
+
+#[cfg(not(feature = "meshopt"))]
+fn decode_views(_: &Reader) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+    BTreeMap::new()
+}
+
+/// Decodes buffer views that meshoptimizer packed.
+#[cfg(feature = "meshopt")]
+fn decode_views(reader: &Reader) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+    let is_compressed = |&i: &usize| meshopt::is_compressed(reader.document, i);
+    let compressed: Vec<usize> = (0..reader.document.buffer_views.len()).filter(is_compressed).collect();
+    compressed.into_par_iter().map(|i| (i, elements::decode(reader, i))).collect()
 }
 
 #[cfg(not(feature = "draco"))]
