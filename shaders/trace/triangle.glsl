@@ -158,9 +158,10 @@ bool is_inside(vec3 e) {
 
 const float HALF_ULP = 5.9604645e-8;
 // Bound on the error of a distance, as a share of it, from which on it is computed again. Errors are a quarter of the bound at most; and any hit
-// needs nothing but the side of tmin that it is on.
+// needs nothing but the side of tmin that it is on, for which an error of half of the distance does no harm. Rays that have just left a wall are computed again the more
+// often the less this is.
 #ifdef STREAM_ANY
-const float LARGEST_ERROR = 1.0;
+const float LARGEST_ERROR = 2.0;
 #else
 const float LARGEST_ERROR = 1.0 / 16.0;
 #endif

@@ -241,12 +241,14 @@ void main() {
             } else {
                 float t;
                 vec2 uv;
+                // words of lanes without a primitive are zeroed, for the same reason as those without an instance
+                uint mine = uint(int(BLOCK_FLAGS) >> 31) & ~at_top;
                 if (HAS_SPHERES && (FIRST_ID & SPHERE) != 0u) {
-                    vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3));
-                    if (meets_sphere(origin, direction, center, uintBitsToFloat(SPHERE_LEAF_RADIUS), world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
+                    vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3) & mine);
+                    if (meets_sphere(origin, direction, center, uintBitsToFloat(SPHERE_LEAF_RADIUS & mine), world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
                 } else {
-                    vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
-                    vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
+                    vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3) & mine), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3) & mine);
+                    vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3) & mine), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3) & mine);
                     if (WATERTIGHT) {
                         Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
                         Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
