@@ -1,5 +1,5 @@
-// primary: one camera ray per sample, jittered within its pixel; where it meets the scene, the occlusion ray that leaves from
-// there is appended to the queue (ao/sample.glsl). A sample without a hit has no further cost.
+// primary: camera rays, jittered within their pixels; where one meets the scene, the occlusion rays that leave from there are appended to
+// the queue, one for each sample that shares the camera ray (ao/sample.glsl). A sample without a hit has no further cost.
 #include "ao/hemisphere.glsl"
 #include "ao/sample.glsl"
 #include "common/entry_points.glsl"
@@ -12,27 +12,32 @@
 // queue for all hits of a packet together.
 #define HAS_ENTRY_POINTS
 #define TAKES_TRACER_HITS
-#define APPENDS_RAY_PER_HIT
+#define APPENDS_RAYS_PER_HIT (1u << push.shared_bits)
 
-// Address of the list for a packet of rays, or null: the root. A packet has a list if its pixels are in one bundle. The host writes lists under the same condition.
+// Address of the list for the packet of rays that begins at an index, or null: the root. A packet has a list if its pixels are in one bundle. The host writes no lists for
+// launches of so few samples that none is.
 uvec2 entry_list(uint index) {
     uvec2 lists = BlockParams(push.pass).entry_points;
-    bool has_list = !is_null(lists) && (1u << (push.sample_bits + BUNDLE_BITS)) >= SUBGROUP_SIZE * PACKET_RAYS;
+    bool has_list = !is_null(lists) && bundle_of(index) == bundle_of(index + SUBGROUP_SIZE * PACKET_RAYS - 1u);
     return has_list ? offset_address(lists, (bundle_of(index) - first_bundle()) * ENTRY_LIST_BYTES) : uvec2(0u);
 }
 
 uvec2 queue_counter() { return BlockParams(push.pass).queue.count; }
 
-// The place in the queue of the ray that the next hit adds.
+// The first of the places in the queue of the rays that the next hit adds.
 uint claimed_slot = 0u;
 #endif
 
-// The index is that of the block.
+// Of the samples of a pixel that share a camera ray, the first. Both indices are those of the block.
+uint first_sample(uint index) {
+    return push.sample_index + ((index & ((1u << push.sample_bits) - 1u)) << push.shared_bits);
+}
+
 Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
-    vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
+    vec2 u = sample_2d(p.seed, pixel, first_sample(index) >> p.camera_shift, CAMERA_FILM);
     if (p.pixel_filter != FILTER_BOX) u = 0.5 + filter_offset(p.pixel_filter, u);
     return camera_ray(p, vec2(pixel) + u);
 }
@@ -42,13 +47,6 @@ Ray ray(uint index) {
     Ray r = camera_sample(p, index);
     dump_ray(p.ray_dump, index, r);
     return r;
-}
-
-Ray sample_occlusion(BlockParams p, uint index, Surface s) {
-    Hemisphere h = hemisphere_at(p, s);
-    uvec2 pixel = block_pixel(p, pixel_index(index)) + p.block_origin;
-    vec3 w = to_world(h.axis, cosine_hemisphere(sample_2d(p.seed, pixel, sample_index(index), AO_DIRECTION)));
-    return occlusion_ray(s.position, s.offset, h.ng, w, p.radius);
 }
 
 void closest(uint index, Hit hit) {
@@ -73,11 +71,18 @@ void closest(uint index, Hit hit) {
         // the point on a triangle follows from its corners; only a sphere needs the ray again
         s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
     }
-    Ray r = sample_occlusion(p, index, s);
-    dump_ray(p.occlusion_dump, index, r);
-#ifdef APPENDS_RAY_PER_HIT
-    store_in_queue(p.queue, claimed_slot, r, index - push.first);
+    Hemisphere h = hemisphere_at(p, s);
+    uvec2 pixel = block_pixel(p, pixel_index(index)) + p.block_origin;
+    uint first = first_sample(index), tag = (index - push.first) << push.shared_bits;
+    for (uint k = 0u; k < 1u << push.shared_bits; k++) {
+        vec3 w = to_world(h.axis, cosine_hemisphere(sample_2d(p.seed, pixel, first + k, AO_DIRECTION)));
+        Ray r = occlusion_ray(s.position, s.offset, h.ng, w, p.radius);
+        // rays are kept of launches in which no samples share a camera ray
+        dump_ray(p.occlusion_dump, index, r);
+#ifdef APPENDS_RAYS_PER_HIT
+        store_in_queue(p.queue, claimed_slot + k, r, tag + k);
 #else
-    append_ray(p.queue, r, index - push.first);
+        append_ray(p.queue, r, tag + k);
 #endif
+    }
 }

@@ -4,7 +4,7 @@
 // costs a lane a fraction of a visit in `wide.glsl`, but the packet visits every block that any of its rays would. The nearest hits are the same.
 //
 // A stream may define before it includes this file: HAS_ENTRY_POINTS, with entry_list(), to start traversal elsewhere than at the root; TAKES_TRACER_HITS, to get hits with the
-// tracer's own ids; APPENDS_RAY_PER_HIT, with queue_counter() and claimed_slot, if each hit adds one ray to a queue.
+// tracer's own ids; APPENDS_RAYS_PER_HIT, the number of rays that each hit adds to a queue, with queue_counter() and claimed_slot.
 //
 // Rays are generated and hits delivered here, without ray and hit buffers. The host uses this kernel only for coherent streams,
 // on devices whose subgroups have at least eight lanes, broadcasts and arithmetic.
@@ -331,7 +331,7 @@ void main() {
     }
 
     if (!finished && lane == 0u) atomicAdd(Counter(root.unfinished).v, 1u);
-#ifdef APPENDS_RAY_PER_HIT
+#ifdef APPENDS_RAYS_PER_HIT
     // Places in the stream's queue for all hits of the packet by one atomic operation. All lanes take part, so no ballot is needed: a CPU driver makes a loop over lanes of both.
     uint slots[PACKET_RAYS], claimed = 0u;
     FOR_RAYS {
@@ -349,7 +349,7 @@ void main() {
         claimed += all_hits;
     }
     uint first_slot = 0u;
-    if (lane == 0u) first_slot = atomicAdd(QueueCount(queue_counter()).v[0], claimed);
+    if (lane == 0u) first_slot = atomicAdd(QueueCount(queue_counter()).v[0], claimed * APPENDS_RAYS_PER_HIT);
     first_slot = subgroupBroadcast(first_slot, 0);
 #endif
     // not unrolled: the stream's code, which may be all of a path's, exists once. Places in arrays stay constants, as CPU drivers keep arrays with others in memory.
@@ -367,8 +367,8 @@ void main() {
                     hit_t = best[j];
                     hit_uv = best_uv[j];
                     hit_corners = best_corners[j];
-#ifdef APPENDS_RAY_PER_HIT
-                    claimed_slot = first_slot + slots[j];
+#ifdef APPENDS_RAYS_PER_HIT
+                    claimed_slot = first_slot + slots[j] * APPENDS_RAYS_PER_HIT;
 #endif
                 }
             }

@@ -10,6 +10,9 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
+/// Launches are multiples of this: of the packets of rays of all devices, also of camera rays that
+/// 16 samples share.
+const GRAIN: u32 = 1 << 10;
 /// Maximum number of rays in a launch on every device, which the tracer must not split.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
@@ -33,7 +36,7 @@ impl Pace {
         Self { rays: FIRST.min(most), most, seen: false }
     }
 
-    /// Rays of the next launch; a multiple of 64.
+    /// Rays of the next launch; a multiple of [`GRAIN`].
     pub fn rays(&self) -> u32 {
         self.rays
     }
@@ -77,8 +80,8 @@ impl Pace {
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
         // the first launch may have compiled the shader: its time says little
         let growth = if self.seen { 2.0 } else { 4.0 };
-        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, self.most as f64);
-        self.rays = (next as u32) & !63;
+        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(GRAIN.into(), self.most as f64);
+        self.rays = (next as u32) / GRAIN * GRAIN;
         self.seen = true;
     }
 }

@@ -20,11 +20,13 @@ pub struct AoSettings {
     pub radius: f64,
     /// `c` in `c^-d`, at least 1; `d` in scene units. 1 is binary occlusion.
     pub falloff: f64,
+    /// Consecutive samples of a pixel that share a camera ray, at least 1.
+    pub rays: u32,
 }
 
 impl Default for AoSettings {
     fn default() -> Self {
-        Self { radius: f64::INFINITY, falloff: 1.0 }
+        Self { radius: f64::INFINITY, falloff: 1.0, rays: 1 }
     }
 }
 
@@ -100,7 +102,7 @@ pub struct AoImage {
     pub variance: Vec<f32>,
 }
 
-/// Renders `spp` samples a pixel: each a jittered camera ray and one occlusion ray from its hit.
+/// Renders `spp` samples a pixel: each an occlusion ray from the hit of a jittered camera ray.
 pub fn render(oracle: &Oracle, camera: &Camera, size: [u32; 2], spp: u32, seed: u32, settings: &AoSettings) -> AoImage {
     let sampler = Sampler { seed };
     let pixels: Vec<[f32; 3]> = (0..size[0] as usize * size[1] as usize)
@@ -109,7 +111,7 @@ pub fn render(oracle: &Oracle, camera: &Camera, size: [u32; 2], spp: u32, seed: 
             let pixel = [i as u32 % size[0], i as u32 / size[0]];
             let (mut n, mut sum, mut squares) = (0.0f64, 0.0, 0.0);
             for s in 0..spp {
-                let u = sampler.get_2d_unit(pixel, s, CAMERA_FILM);
+                let u = sampler.get_2d_unit(pixel, s / settings.rays, CAMERA_FILM);
                 let film = [pixel[0] as f64 + u[0] as f64, pixel[1] as f64 + u[1] as f64];
                 let ray = camera_ray(camera, oracle.origin(), size, film);
                 let hit = oracle.closest(ray);

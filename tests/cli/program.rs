@@ -54,6 +54,8 @@ fn usage_errors() {
     refuses(&render(&["--spp", "0"]), 64, "--spp");
     refuses(&render(&["--fov-y", "nan"]), 64, "--fov-y");
     refuses(&render(&["--ao-falloff", "0.5"]), 64, "at least 1");
+    refuses(&render(&["--ao-rays", "3"]), 64, "power of two from 1 to 16");
+    refuses(&render(&["--ao-rays", "4", "--preset", "fast"]), 64, "--ao-rays is for stills");
     refuses(&render(&["--ao-radius", "-1"]), 64, "above 0");
     refuses(&render(&["--time-limit", "-3"]), 64, "above 0");
     refuses(&render(&["--eye", "1,2,3"]), 64, "--target");

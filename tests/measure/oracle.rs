@@ -329,7 +329,7 @@ mod ao {
         }
     }
 
-    const BINARY: AoSettings = AoSettings { radius: f64::INFINITY, falloff: 1.0 };
+    const BINARY: AoSettings = AoSettings { radius: f64::INFINITY, falloff: 1.0, rays: 1 };
 
     #[test]
     fn planes_and_boxes() {
@@ -409,7 +409,14 @@ mod ao {
         let s = analytic::parallel_planes(1e4, 1e4, 0.5, SceneTransform::default());
         for (c, radius) in [(8.0, f64::INFINITY), (2.0, f64::INFINITY), (8.0, 1.0), (1.0, 0.8), (1.0, 0.4)] {
             let want = exact::parallel_disk(0.5, f64::INFINITY, c, radius);
-            check(&format!("planes {c} {radius}"), &s, DVec3::ZERO, DVec3::Y, AoSettings { radius, falloff: c }, want);
+            check(
+                &format!("planes {c} {radius}"),
+                &s,
+                DVec3::ZERO,
+                DVec3::Y,
+                AoSettings { radius, falloff: c, rays: 1 },
+                want,
+            );
         }
         assert!((exact::parallel_disk(1.0, 2.0, 1.0, f64::INFINITY) - 0.2).abs() < 1e-12);
         // 1 - 2 E_3(ln 8), by the series of E_1 and the recurrence (Abramowitz and Stegun 5.1.11, 5.1.14)

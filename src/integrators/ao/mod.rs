@@ -34,13 +34,16 @@ use crate::shaders::{self, StreamShaders};
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Needs, Push, Tracer};
 
+/// Samples per pixel from which on they share camera rays.
+const MIN_SHARING_SPP: u32 = 64;
+
 /// Value of a sample whose camera ray missed; ambient visibility is never negative.
 const NO_HIT: f32 = -1.0;
 
 /// Options of an ambient occlusion image.
 #[derive(Clone, Debug)]
 pub struct AoOptions {
-    /// Settings of samples, of one camera ray and one occlusion ray each.
+    /// Settings of samples, of one occlusion ray each.
     pub samples: SampleSettings,
     /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
     pub radius: f64,
@@ -48,6 +51,8 @@ pub struct AoOptions {
     pub falloff: f64,
     /// Axis of the hemisphere.
     pub hemisphere: Hemisphere,
+    /// Consecutive samples of a pixel that share a camera ray: a power of two.
+    pub rays: u32,
 }
 
 impl Default for AoOptions {
@@ -57,6 +62,7 @@ impl Default for AoOptions {
             radius: f64::INFINITY,
             falloff: 1.0,
             hemisphere: Hemisphere::Geometric,
+            rays: 1,
         }
     }
 }
@@ -74,6 +80,14 @@ impl AoOptions {
     }
 }
 
+/// Samples of a pixel that share a camera ray where settings do not say it. With two, images of 64
+/// samples have less error where there is something to occlude, and silhouettes one per cent more;
+/// of 16 samples they would have six. A film that can be resumed has as many, however many samples
+/// it will get.
+fn default_rays(samples: &SampleSettings) -> u32 {
+    if samples.spp >= MIN_SHARING_SPP && !samples.film.keep_state { 2 } else { 1 }
+}
+
 /// Ambient occlusion: the unoccluded fraction of the cosine-weighted hemisphere over a point.
 pub struct AmbientOcclusion;
 
@@ -85,6 +99,7 @@ impl AmbientOcclusion {
             radius: ao.radius(),
             falloff: ao.ao_falloff.unwrap_or(1.0),
             hemisphere: ao.hemisphere(),
+            rays: ao.ao_rays.unwrap_or_else(|| default_rays(&job.samples)),
         }
     }
 }
@@ -145,7 +160,7 @@ impl Integrator for AmbientOcclusion {
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
-        let AoOptions { samples, radius, falloff, hemisphere } = Self::options(job);
+        let AoOptions { samples, radius, falloff, hemisphere, rays } = Self::options(job);
         let SampleSettings {
             size: _,
             spp: _,
@@ -160,6 +175,9 @@ impl Integrator for AmbientOcclusion {
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
             ("ao.normal", Some(hemisphere.to_string())),
+            // none of an image whose samples have a camera ray each, as images had before there was
+            // a choice
+            ("ao.rays", (rays > 1).then(|| rays.to_string())),
             ("pixel_filter", Some(pixel_filter.to_string())),
         ]
     }
@@ -187,6 +205,9 @@ impl Integrator for AmbientOcclusion {
 pub struct AoResult {
     /// The image and statistics of its camera rays.
     pub image: Accumulated,
+    /// Camera rays traced: fewer than [`Accumulated::primary_rays`], which counts the samples, if
+    /// samples share them.
+    pub camera_rays: u64,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
     /// Occlusion rays not traced because their camera ray missed.
@@ -207,6 +228,8 @@ struct AoEstimator {
     params: Buffer,
     dumps: Option<[Buffer; 2]>,
     kept: [Vec<Ray>; 2],
+    // samples and camera rays of all launches, padding included
+    launched: [u64; 2],
 }
 
 /// The streams that [`render`] traces.
@@ -229,12 +252,13 @@ pub fn render(
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
-        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits)?,
+        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.ilog2())?,
         has_entry_points: false,
         resolve: shaders::RESOLVE.pipeline(device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
         dumps: if samples.keep_rays { Some([ray_buffer(device, most)?, ray_buffer(device, most)?]) } else { None },
         kept: Default::default(),
+        launched: [0; 2],
     };
     let params = estimator.rays.params(BlockParams {
         orthographic: camera.orthographic.into(),
@@ -247,9 +271,12 @@ pub fn render(
     let image = accumulate(tracer, camera, samples, &params, &mut estimator, control)?;
     let has_entry_points = estimator.has_entry_points;
     let [kept_primary, kept_occlusion] = estimator.kept;
+    let [launched_samples, launched_camera_rays] = estimator.launched;
+    let camera_share = launched_camera_rays as f64 / launched_samples.max(1) as f64;
+    let camera_rays = (image.primary_rays as f64 * camera_share).round() as u64;
     let occlusion_rays = image.covered;
     let skipped_rays = image.primary_rays + image.skipped_primary_rays - occlusion_rays;
-    Ok(AoResult { image, occlusion_rays, skipped_rays, has_entry_points, kept_primary, kept_occlusion })
+    Ok(AoResult { image, camera_rays, occlusion_rays, skipped_rays, has_entry_points, kept_primary, kept_occlusion })
 }
 
 fn ray_buffer(device: &Arc<Device>, rays: u32) -> Result<Buffer> {
@@ -276,6 +303,8 @@ impl Estimator for AoEstimator {
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>> {
         let timings = commands.run(|r| {
             for push in launches {
+                self.launched[0] += u64::from(push.count);
+                self.launched[1] += u64::from(self.rays.camera_push(push).count);
                 self.rays.record(r, push, self.has_entry_points);
                 r.barrier();
                 let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);

@@ -16,6 +16,7 @@ pub struct AoRays {
     entry_points: Option<EntryPoints>,
     queue: RayQueue,
     samples: Buffer,
+    camera_shift: u32,
 }
 
 /// The streams that samples need: without a falloff any hit ends an occlusion ray.
@@ -25,20 +26,28 @@ pub fn streams(attenuation: Attenuation) -> [&'static StreamShaders; 2] {
 }
 
 impl AoRays {
-    /// For launches of at most `most` samples, and at most 2^`sample_bits` of a pixel.
+    /// For launches of at most `most` samples, and at most 2^`sample_bits` of a pixel, of which
+    /// 2^`camera_shift` consecutive ones share a camera ray.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(tracer: &Tracer, attenuation: Attenuation, most: u32, sample_bits: u32) -> Result<Self> {
+    pub fn new(
+        tracer: &Tracer,
+        attenuation: Attenuation,
+        most: u32,
+        sample_bits: u32,
+        camera_shift: u32,
+    ) -> Result<Self> {
         let device = tracer.device();
         let [primary, occlusion] = streams(attenuation);
         let primary = tracer.stream(primary)?;
         Ok(Self {
-            entry_points: EntryPoints::new(tracer, &primary, most, sample_bits)?,
+            entry_points: EntryPoints::new(tracer, &primary, most, sample_bits.saturating_sub(camera_shift))?,
             primary,
             occlusion: tracer.stream(occlusion)?,
             queue: RayQueue::new(device, most)?,
             samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * u64::from(most), Memory::Device)?,
+            camera_shift,
         })
     }
 
@@ -58,6 +67,7 @@ impl AoRays {
         BlockParams {
             samples: self.samples.address(),
             queue: self.queue.record(),
+            camera_shift: self.camera_shift,
             entry_points: match &self.entry_points {
                 Some(lists) if self.has_entry_points(&params) => lists.address(),
                 _ => 0,
@@ -66,15 +76,30 @@ impl AoRays {
         }
     }
 
+    /// The camera rays of a launch of samples. A launch that begins or ends between samples that
+    /// share a camera ray traces that ray again: the samples are the same, however they are
+    /// launched.
+    pub fn camera_push(&self, push: &Push) -> Push {
+        let shared_bits = self.camera_shift.min(push.sample_bits).min(push.sample_index.trailing_zeros());
+        Push {
+            first: push.first >> shared_bits,
+            count: push.count >> shared_bits,
+            sample_bits: push.sample_bits - shared_bits,
+            shared_bits,
+            ..*push
+        }
+    }
+
     /// Records the rays of a launch. Commands before and after it need a barrier in between.
     pub fn record(&self, r: &mut Recorder, push: &Push, has_entry_points: bool) {
+        let camera = self.camera_push(push);
         self.queue.clear(r);
         if let Some(entry_points) = self.entry_points.as_ref().filter(|_| has_entry_points) {
-            entry_points.record(r, push);
+            entry_points.record(r, &camera);
         }
         r.fill(&self.samples, size_of::<f32>() as u64 * u64::from(push.count), NO_HIT.to_bits());
         r.barrier();
-        self.primary.record(r, push);
+        self.primary.record(r, &camera);
         r.barrier();
         self.occlusion.record(r, &self.queue.push(*push, push.count));
     }

@@ -11,7 +11,7 @@ use crate::interface::records::block::MAX_ENTRY_POINTS;
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
     let image = &result.image;
     let covered_mean = covered_mean(&image.film.mean, 1, &image.film.coverage);
-    let traced = image.primary_rays + result.occlusion_rays;
+    let traced = result.camera_rays + result.occlusion_rays;
     let mrays_s = if image.trace_seconds > 0.0 { traced as f64 / image.trace_seconds / 1e6 } else { 0.0 };
     let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
     let record = json!({
@@ -19,11 +19,12 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
             "radius": finite(options.radius),
             "falloff": options.falloff,
             "normal": options.hemisphere,
+            "rays": options.rays,
             "reach": finite(options.attenuation().reach()),
         },
         "covered_mean": covered_mean,
         "rays": {
-            "primary": image.primary_rays,
+            "primary": result.camera_rays,
             "skipped_primary": image.skipped_primary_rays,
             "occlusion": result.occlusion_rays,
             "skipped": result.skipped_rays,
@@ -52,6 +53,9 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
             "entry points: camera rays of 2x2 pixels start at up to {MAX_ENTRY_POINTS} blocks of the hierarchy, \
              the levels above are skipped"
         ));
+    }
+    if options.rays > 1 {
+        explanations.push(format!("camera rays are shared by {} samples of their pixel", options.rays));
     }
     let all = result.occlusion_rays + result.skipped_rays;
     explanations.push(format!(

@@ -8,6 +8,9 @@ use crate::settings::{AppliesTo, Capability, Length, settings};
 /// Integrators that these settings apply to.
 const AO: AppliesTo = AppliesTo::all_of(Capability::AmbientOcclusion);
 
+/// Maximum number of occlusion rays per camera ray.
+const MAX_RAYS: u32 = 16;
+
 settings! {
     /// Ambient occlusion.
     "Ambient occlusion"
@@ -21,7 +24,18 @@ settings! {
         ao_falloff: Option<f64>, option(value_name = "C", value_parser = parse_falloff, allow_hyphen_values = true), applies(AO);
         /// Normal of the hemisphere that AO samples [default: geometric]
         ao_normal: Option<Hemisphere>, option(value_enum), applies(AO), research;
+        /// Occlusion rays per camera ray: a power of two up to 16 [default: 2 from 64 samples per pixel on, else and with --resumable 1]
+        ///
+        /// So many samples of a pixel share a camera ray and the surface point that it meets. Fewer camera rays take less time; edges need them.
+        ao_rays: Option<u32>, option(value_name = "N", value_parser = parse_rays), applies(AppliesTo::stills_of(Capability::AmbientOcclusion));
     }
+}
+
+/// A number of occlusion rays per camera ray.
+#[cfg(feature = "cli")]
+fn parse_rays(text: &str) -> Result<u32, String> {
+    let rays = text.trim().parse().ok().filter(|n: &u32| n.is_power_of_two() && *n <= MAX_RAYS);
+    rays.ok_or_else(|| format!("must be a power of two from 1 to {MAX_RAYS}"))
 }
 
 impl AoSettings {

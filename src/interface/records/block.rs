@@ -79,7 +79,7 @@ records! {
         clip_near: float,
         /// Distance of the far clipping plane; 0: none.
         clip_far: float,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint,
+        /// Log2 of the number of consecutive samples of a pixel that share a camera ray.
+        camera_shift: uint,
     }
 }

@@ -55,5 +55,10 @@ records! {
         sample_index: uint,
         /// A launch traces `2^sample_bits` consecutive samples of each of its pixels.
         sample_bits: uint,
+        /// Each camera ray of this launch is shared by `2^shared_bits` consecutive samples of its
+        /// pixel (shaders/primary.glsl).
+        shared_bits: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 }

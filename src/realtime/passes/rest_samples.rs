@@ -45,7 +45,7 @@ impl Traced {
     fn new(frame: &Frame, most: u32, sample_bits: u32) -> Result<Self> {
         let device = frame.tracer.device();
         Ok(Self {
-            rays: AoRays::new(frame.tracer, frame.settings.attenuation(), most, sample_bits)?,
+            rays: AoRays::new(frame.tracer, frame.settings.attenuation(), most, sample_bits, 0)?,
             has_entry_points: false,
             block: Params::new(device, "block parameters of samples at rest")?,
             resolve: shaders::REST_SAMPLES.pipeline(device)?,
