@@ -33,10 +33,22 @@ struct Sheen {
     float kept;  // of what is below, on wo's side
 };
 
+// A thin film over the interface of a glTF material: iridescence.
+struct Film {
+    float weight;
+    float thickness;  // nanometres
+    float ior;
+    vec3 f0;          // of the dielectric part of what is below
+    vec3 metal_f0;    // and of the metal
+    vec3 dielectric_share;  // of all that is reflected, energy compensation included
+    vec3 metal_share;
+};
+
 // How often each lobe of a glTF material is sampled; the sum is 1.
 struct LobeProbabilities {
     float interface_;  // specular reflection and transmission
     float diffuse;
+    float through;     // diffuse transmission
     float clearcoat;
     float sheen;
 };
@@ -44,6 +56,8 @@ struct LobeProbabilities {
 struct Bsdf {
     uint kind;
     vec3 diffuse;
+    vec3 through;      // of what is transmitted diffusely
+    float through_share;   // of what is diffuse
     vec3 f0;           // glTF: Schlick's term of dielectric and metal, mixed; of volumes the metal's part alone. Conductor: index of refraction
     vec3 f90;
     float dielectric_f0;   // Schlick's term of a glTF material's dielectric part, in its brightest channel
@@ -58,6 +72,7 @@ struct Bsdf {
     float base_transmittance;  // with energy compensation: share of light that reaches what is under the interface
     Clearcoat clearcoat;
     Sheen sheen;
+    Film film;
     LobeProbabilities probabilities;
     vec3 ng;           // geometric normal in the frame, on the viewer's side
 };
@@ -85,15 +100,16 @@ const BsdfSample NO_SAMPLE = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, fal
 Bsdf black_bsdf() {
     Bsdf b;
     b.kind = BSDF_NONE;
-    b.diffuse = b.f0 = b.k = b.transmitted = vec3(0.0);
+    b.diffuse = b.through = b.f0 = b.k = b.transmitted = vec3(0.0);
     b.tint = b.f90 = vec3(1.0);
-    b.dielectric_f0 = 0.0;
+    b.dielectric_f0 = b.through_share = 0.0;
     b.dielectric_f90 = b.dielectric_weight = b.eta = b.base_transmittance = 1.0;
     b.volume = false;
     b.facets = Microfacets(vec2(1.0), false);
     b.clearcoat = Clearcoat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
     b.sheen = Sheen(vec3(0.0), 1.0, 1.0);
-    b.probabilities = LobeProbabilities(0.0, 0.0, 0.0, 0.0);
+    b.film = Film(0.0, 0.0, 1.0, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+    b.probabilities = LobeProbabilities(0.0, 0.0, 0.0, 0.0, 0.0);
     b.ng = vec3(0.0, 0.0, 1.0);
     return b;
 }

@@ -3,9 +3,13 @@
 #ifndef BSDF_GLTF_
 #define BSDF_GLTF_
 #include "bsdf/clearcoat.glsl"
+#include "bsdf/iridescence.glsl"
 #include "bsdf/sheen.glsl"
 
 bool has_transmission() { return HAS_THIN_WALLS || HAS_VOLUMES; }
+
+// Is any light of a Bsdf transmitted diffusely?
+bool is_translucent(Bsdf b) { return HAS_DIFFUSE_TRANSMISSION && b.through != vec3(0.0); }
 
 // What microfacets do with light.
 struct InterfaceFresnel {
@@ -26,6 +30,16 @@ InterfaceFresnel interface_fresnel(Bsdf b, float c) {
         vec3 tint = cos_t > 0.0 ? b.tint : vec3(1.0);
         dielectric = f * highest(tint);
         reflected += b.dielectric_weight * f * tint;
+    }
+    if (HAS_IRIDESCENCE && b.film.weight > 0.0) {
+        // from inside of a volume by the cosine outside, where nothing gets beyond the critical angle
+        float outside = c;
+        if (HAS_VOLUMES && b.volume && b.eta < 1.0) fresnel_dielectric(c, b.eta, outside);
+        vec3 of_dielectric = outside > 0.0 ? film_fresnel(b.film, outside, b.film.f0) : vec3(1.0);
+        vec3 all_reflected = b.film.dielectric_share * of_dielectric;
+        if (b.film.metal_share != vec3(0.0)) all_reflected += b.film.metal_share * film_fresnel(b.film, outside, b.film.metal_f0);
+        reflected = mix(reflected, all_reflected, b.film.weight);
+        dielectric = mix(dielectric, highest(of_dielectric), b.film.weight);
     }
     InterfaceFresnel all_ = InterfaceFresnel(reflected, 1.0 - dielectric, 1.0 - dielectric);
     if (HAS_COMPENSATION) {
@@ -66,6 +80,18 @@ void set_interface(inout Bsdf b, vec3 f0, float f90, vec3 base, float metallic, 
             b.transmitted /= e;
         }
     }
+    if (HAS_IRIDESCENCE && b.film.weight > 0.0) {
+        b.film.f0 = f0;
+        b.film.metal_f0 = base;
+        b.film.dielectric_share = (1.0 - metallic) * dielectric_gain;
+        b.film.metal_share = metallic * metal_gain;
+        if (HAS_COMPENSATION) {
+            // what is below gets what the film leaves as it is seen from here
+            float e = is_smooth(b.facets) ? 1.0 : ggx_albedo(cos_o, roughness);
+            float left = 1.0 - e * highest(dielectric_gain * film_fresnel(b.film, cos_o, f0));
+            b.base_transmittance = mix(b.base_transmittance, clamp(left, 0.0, 1.0), b.film.weight);
+        }
+    }
     b.dielectric_f0 = highest(f0);
     b.dielectric_f90 = f90;
     b.dielectric_weight = (1.0 - metallic) * dielectric_gain.x;
@@ -86,21 +112,28 @@ float reflected_probability(Bsdf b, InterfaceFresnel f) {
 void set_probabilities(inout Bsdf b, float cos_o) {
     InterfaceFresnel f = interface_fresnel(b, cos_o);
     vec4 w = vec4(highest(f.reflected) + highest(b.transmitted) * f.transmitted, highest(b.diffuse) * f.diffuse, 0.0, 0.0);
+    float through = HAS_DIFFUSE_TRANSMISSION ? highest(b.through) * f.diffuse : 0.0;
     if (HAS_SHEEN) {
         w.xy *= b.sheen.kept;
+        through *= b.sheen.kept;
         w.w = 1.0 - b.sheen.kept;
     }
     if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) {
         w.z = b.clearcoat.weight * clearcoat_fresnel(cos_o);
         w.xyw *= 1.0 - w.z;
+        through *= 1.0 - w.z;
     }
-    float sum = w.x + w.y + w.z + w.w;
-    if (sum > 0.0) w /= sum;
-    b.probabilities = LobeProbabilities(w.x, w.y, w.z, w.w);
+    float sum = w.x + w.y + w.z + w.w + through;
+    if (sum > 0.0) {
+        w /= sum;
+        through /= sum;
+    }
+    b.probabilities = LobeProbabilities(w.x, w.y, through, w.z, w.w);
 }
 
 bool gltf_has_rough_part(Bsdf b) {
-    if (b.probabilities.diffuse > 0.0 || HAS_SHEEN && b.probabilities.sheen > 0.0) return true;
+    if (b.probabilities.diffuse > 0.0 || HAS_DIFFUSE_TRANSMISSION && b.probabilities.through > 0.0) return true;
+    if (HAS_SHEEN && b.probabilities.sheen > 0.0) return true;
     if (HAS_CLEARCOAT && b.probabilities.clearcoat > 0.0 && !is_smooth(b.clearcoat.facets)) return true;
     return !is_smooth(b.facets) && b.probabilities.interface_ > 0.0;
 }
@@ -109,6 +142,11 @@ bool gltf_has_rough_part(Bsdf b) {
 BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = NO_VALUE;
     bool up = wi.z > 0.0, straight = !up && !(HAS_VOLUMES && b.volume);
+    if (!up && wi.z < 0.0 && is_translucent(b)) {
+        // what is below lies behind the interface as light crosses it to be reflected
+        float cosine = -wi.z / PI, diffuse = interface_fresnel(b, dot(wo, normalize(wo + vec3(wi.xy, -wi.z)))).diffuse;
+        value = BsdfValue(b.through * (diffuse * cosine), b.probabilities.through * cosine);
+    }
     if (!up && (!has_transmission() || b.transmitted == vec3(0.0) || wi.z == 0.0)) return value;
     // thin walls: what goes straight on is what would be reflected, on the other side
     vec3 w = straight ? vec3(wi.xy, -wi.z) : wi;
@@ -127,11 +165,12 @@ BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
         value.f += f.reflected * (d / (4.0 * wo.z));
         value.pdf += reflects * reflected_pdf(b.facets, wo, m);
     } else if (straight) {
-        value = BsdfValue(b.transmitted * (f.transmitted * d / (4.0 * wo.z)), transmits * reflected_pdf(b.facets, wo, m));
+        value.f += b.transmitted * (f.transmitted * d / (4.0 * wo.z));
+        value.pdf += transmits * reflected_pdf(b.facets, wo, m);
     } else {
         float im = dot(wi, m);
-        value = BsdfValue(b.transmitted * (f.transmitted * d * refracted_value(b.eta, wo.z, om, im)),
-                          transmits * refracted_pdf(b.facets, b.eta, wo, m, im));
+        value.f += b.transmitted * (f.transmitted * d * refracted_value(b.eta, wo.z, om, im));
+        value.pdf += transmits * refracted_pdf(b.facets, b.eta, wo, m, im);
     }
     return value;
 }
@@ -217,8 +256,16 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
         if (found) return s;
         return NO_SAMPLE;
     }
-    if (v < b.probabilities.interface_ + b.probabilities.diffuse) return proposed(cosine_hemisphere(u), 1.0);
-    if (HAS_CLEARCOAT && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.clearcoat) {
+    float below = b.probabilities.interface_ + b.probabilities.diffuse;
+    if (v < below) return proposed(cosine_hemisphere(u), 1.0);
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        below += b.probabilities.through;
+        if (v < below) {
+            vec3 wi = cosine_hemisphere(u);
+            return proposed(vec3(wi.xy, -wi.z), 1.0);
+        }
+    }
+    if (HAS_CLEARCOAT && v < below + b.probabilities.clearcoat) {
         vec3 m = clearcoat_microfacet(b.clearcoat, wo, u);
         vec3 wi = 2.0 * dot(wo, m) * m - wo;
         if (!(wi.z > 0.0)) return NO_SAMPLE;
@@ -262,8 +309,9 @@ void gltf_setup(inout Bsdf b, inout MaterialPoint point) {
     vec3 f0 = min(r0 * r0 * specular_color, vec3(1.0)) * specular;
     b.facets = Microfacets(vec2(roughness * roughness), false);
     if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0)) point.along = anisotropic(point.textures, m, b.facets.alpha);
+    float transmission = 0.0;
     if (has_transmission() && SHADING_OF(m).walls != WALLS_NONE) {
-        float transmission = SHADING_OF(m).transmission * point.textures.at[USE_TRANSMISSION].r;
+        transmission = SHADING_OF(m).transmission * point.textures.at[USE_TRANSMISSION].r;
         b.transmitted = b.diffuse * transmission;
         b.diffuse *= 1.0 - transmission;
         b.volume = HAS_VOLUMES && SHADING_OF(m).walls == WALLS_VOLUME;
@@ -271,6 +319,19 @@ void gltf_setup(inout Bsdf b, inout MaterialPoint point) {
             b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
             b.tint = min(specular_color, vec3(1.0)) * specular;
         }
+    }
+    if (HAS_DIFFUSE_TRANSMISSION && SHADING_OF(m).diffuse_transmission > 0.0) {
+        float share = SHADING_OF(m).diffuse_transmission * point.textures.at[USE_DIFFUSE_TRANSMISSION].a;
+        vec3 color = SHADING_OF(m).diffuse_transmission_color * point.textures.at[USE_DIFFUSE_TRANSMISSION_COLOR].rgb;
+        b.diffuse *= 1.0 - share;
+        b.through_share = share;
+        b.through = color * (share * (1.0 - metallic) * (1.0 - transmission));
+    }
+    if (HAS_IRIDESCENCE && SHADING_OF(m).iridescence > 0.0) {
+        vec2 thickness = SHADING_OF(m).iridescence_thickness;
+        b.film.weight = SHADING_OF(m).iridescence * point.textures.at[USE_IRIDESCENCE].r;
+        b.film.thickness = mix(thickness.x, thickness.y, point.textures.at[USE_IRIDESCENCE_THICKNESS].g);
+        b.film.ior = SHADING_OF(m).iridescence_ior;
     }
     if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
         float r = SHADING_OF(m).sheen_roughness * point.textures.at[USE_SHEEN_ROUGHNESS].a;

@@ -18,7 +18,9 @@ vec4 environment_and_pdf(PathParams p, vec3 w) {
 }
 
 // Can light from behind the surface be scattered to the viewer?
-bool transmits_light(Shading m) { return (has_transmission() || HAS_DIELECTRIC) && m.bsdf.transmitted != vec3(0.0); }
+bool transmits_light(Shading m) {
+    return (has_transmission() || HAS_DIELECTRIC) && m.bsdf.transmitted != vec3(0.0) || is_translucent(m.bsdf);
+}
 
 // A constant environment is sampled by the cosine to the shading normal, as a diffuse surface scatters it, on each side that light may come from. Per solid
 // angle.

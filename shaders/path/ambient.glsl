@@ -8,7 +8,7 @@
 // directions, of which ambient occlusion says nothing: 0.
 vec3 ambient_reflectance(Surface s, Shading m, float log_side) {
     if (!has_rough_part(m.bsdf)) return vec3(0.0);
-    return max(surface_albedo(s, log_side) - m.bsdf.transmitted, vec3(0.0));
+    return max(surface_albedo(s, log_side) * (1.0 - m.bsdf.through_share) - m.bsdf.transmitted, vec3(0.0));
 }
 
 // The occlusion ray of a sample (ao/sample.glsl). With falloff c its length is random, longer than d with probability c^-d: a hit at distance d then occludes by

@@ -67,7 +67,7 @@ BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
 BsdfSample sample_direction(Shading m, vec3 wo, vec2 u, float v) {
     Bsdf b = m.bsdf;
     // a delta lobe can be sampled in one way only, and these know reflection only
-    bool plain = (WITH_COSINE_SAMPLING || WITH_UNIFORM_SAMPLING) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
+    bool plain = (WITH_COSINE_SAMPLING || WITH_UNIFORM_SAMPLING) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0) && b.through == vec3(0.0);
     BsdfSample s;
     if (plain) s = proposed(WITH_COSINE_SAMPLING ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
     else s = bsdf_sample(b, wo, u, v);

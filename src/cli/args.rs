@@ -12,9 +12,12 @@ use crate::settings::parse::parse_limit;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
 
-/// Which files of a scene are read.
-#[derive(Clone, Copy, Debug, Default, Args)]
+/// Which files of a scene are read, and which of a file's scenes.
+#[derive(Clone, Debug, Default, Args)]
 pub struct LoadArgs {
+    /// Scene of a glTF file that has several, by its name or its number from 0 [default: the one that the file names]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Scene", hide_short_help = true)]
+    pub gltf_scene: Option<String>,
     /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
     ///
     /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
@@ -24,11 +27,13 @@ pub struct LoadArgs {
 
 impl LoadArgs {
     /// The options of the loader.
-    pub fn options(self) -> LoadOptions<'static> {
-        LoadOptions {
-            confine: if self.confine { Confine::SceneFolder } else { Confine::Nowhere },
-            ..LoadOptions::default()
-        }
+    pub fn options(&self) -> LoadOptions<'_> {
+        LoadOptions { scene: self.gltf_scene.as_deref(), confine: self.confine(), ..LoadOptions::default() }
+    }
+
+    /// Where the files must lie that a scene refers to.
+    pub fn confine(&self) -> Confine<'static> {
+        if self.confine { Confine::SceneFolder } else { Confine::Nowhere }
     }
 }
 

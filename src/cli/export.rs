@@ -50,7 +50,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     plan.check()?;
     files::check_writable(output)?;
     let mut scene = load::load_with(&args.scene, &args.load.options())?;
-    args.meaning.apply(&mut scene);
+    args.meaning.apply(&mut scene)?;
     check_companions(args, plan, &scene, output)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));

@@ -94,7 +94,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
     let mut scene = load::load_with(&args.scene, &args.load.options())?;
-    args.meaning.apply(&mut scene);
+    args.meaning.apply(&mut scene)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
 
@@ -107,6 +107,8 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         "scene": args.scene,
         "format": format,
         "unit": unit(format),
+        "metadata": scene.report.metadata,
+        "scenes": scene.report.scenes,
         "extensions": extensions,
         "files": scene.report.files,
         "normals_computed": scene.report.normals_computed,
@@ -168,6 +170,14 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         add("bounds", format!("{} to {}, diagonal {}", corner(lo), corner(hi), significant(i.diagonal)));
     }
 
+    if scene.report.scenes.len() > 1 {
+        let names = scene.report.scenes.iter().enumerate().map(|(k, name)| format!("{k} `{name}`"));
+        add("scenes", format!("{} (--scene)", names.collect::<Vec<_>>().join(", ")));
+    }
+    for (name, text) in &scene.report.metadata {
+        add("metadata", format!("{name}: {text}"));
+    }
+
     // geometry and surfaces
     let instanced = if i.triangles == i.unique_triangles {
         String::new()
@@ -206,10 +216,15 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     add("surfaces", format!("{edges}{dropped}"));
 
     // materials and textures
+    let named = |name: &String| if name.is_empty() { "without a name".to_owned() } else { name.clone() };
     let joined = |all: &mut dyn Iterator<Item = (String, usize)>| {
         all.map(|(name, n)| format!("{n} {name}")).collect::<Vec<_>>().join(", ")
     };
     add("materials", joined(&mut i.materials.iter().map(|(k, n)| (k.clone(), *n))));
+    if !i.variants.is_empty() {
+        let names = i.variants.iter().map(named).collect::<Vec<_>>().join(", ");
+        add("variants", format!("{names} (--variant)"));
+    }
     if i.textures.count > 0 {
         let t = &i.textures;
         add(
@@ -226,7 +241,6 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     }
 
     // cameras, lights and animations
-    let named = |name: &String| if name.is_empty() { "without a name".to_owned() } else { name.clone() };
     add(
         "cameras",
         if i.cameras.is_empty() { "none".into() } else { i.cameras.iter().map(named).collect::<Vec<_>>().join(", ") },

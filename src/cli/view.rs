@@ -122,7 +122,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     check_has_effect(&given)?;
 
     // settings of the command line and of files
-    let confine = args.load.options().confine;
+    let confine = args.load.confine();
     let files = args.config.files(args.scene.as_deref(), confine)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
@@ -139,6 +139,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
     let options = ViewOptions {
         scene: args.scene.clone(),
+        gltf_scene: args.load.gltf_scene.clone(),
         confine,
         size: settings.image.size.unwrap_or(DEFAULT_SIZE),
         settings,

@@ -136,6 +136,8 @@ feature_set! {
     Volumes = "HAS_VOLUMES", "volumes";
     Absorption = "HAS_ABSORPTION", "absorption";
     Anisotropy = "HAS_ANISOTROPY", "anisotropy";
+    Iridescence = "HAS_IRIDESCENCE", "iridescence";
+    DiffuseTransmission = "HAS_DIFFUSE_TRANSMISSION", "diffuse transmission";
     BaseColors = "HAS_BASE_COLORS", "base colours that vary over a surface";
     Emission = "HAS_EMISSION", "emissive surfaces";
     Compensation = "HAS_COMPENSATION", "energy compensation";
@@ -162,6 +164,10 @@ feature_set! {
     SpecularColor = "USE_SPECULAR_COLOR", "specular colour";
     Anisotropy = "USE_ANISOTROPY", "anisotropy";
     Occlusion = "USE_OCCLUSION", "occlusion";
+    Iridescence = "USE_IRIDESCENCE", "iridescence";
+    IridescenceThickness = "USE_IRIDESCENCE_THICKNESS", "iridescence thickness";
+    DiffuseTransmission = "USE_DIFFUSE_TRANSMISSION", "diffuse transmission";
+    DiffuseTransmissionColor = "USE_DIFFUSE_TRANSMISSION_COLOR", "diffuse transmission colour";
 }
 
 feature_set! {

@@ -7,6 +7,12 @@ use crate::settings::Capability;
 const RANGE: [f64; 2] = [0.02, 0.98];
 /// Share of a pixel that surfaces must cover to count.
 const COVERED: f32 = 0.99;
+/// Luminance of middle grey.
+const MIDDLE_GREY: f64 = 0.18;
+/// Exposures of fewer stops are not chosen: such an image shows what it has.
+const FAR: f64 = 3.0;
+/// Values count as this share of the mean at least.
+const DARK: f64 = 1e-3;
 /// Luminance of linear sRGB.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
@@ -19,6 +25,26 @@ pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
         film.plane(c).iter().zip(&film.coverage).filter(|(_, a)| **a >= COVERED).map(|(v, _)| f64::from(*v)).sum()
     };
     (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
+}
+
+/// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms;
+/// `None` where that is near to what is shown anyway, and where no surface has light. Reinhard,
+/// Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
+pub fn exposure(image: &Accumulated) -> Option<f64> {
+    let film = &image.film;
+    let planes = [0, 1, 2].map(|c| film.plane(c));
+    let shown = film.coverage.iter().enumerate().filter(|(_, a)| **a >= COVERED);
+    let luminance = |(i, _)| -> f64 { LUMINANCE.iter().zip(&planes).map(|(w, p)| w * f64::from(p[i])).sum() };
+    let values: Vec<f64> = shown.map(luminance).collect();
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    if mean <= 0.0 || !mean.is_finite() {
+        return None;
+    }
+
+    // what light hardly reaches must not decide
+    let logarithms = values.iter().map(|v| v.max(DARK * mean).ln()).sum::<f64>();
+    let average = (logarithms / values.len() as f64).exp();
+    Some((MIDDLE_GREY / average).log2().round()).filter(|stops| stops.abs() >= FAR)
 }
 
 /// A warning about an image of this mean, with a remedy; `None` if it is fine. `exposure` in stops.
@@ -70,6 +96,27 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exposures_follow_surfaces() {
+        let image = |values: &[(f32, f32)]| {
+            let mut film = crate::film::Film::new(values.len() as u32, 1, 3);
+            for (i, (value, coverage)) in values.iter().enumerate() {
+                film.mean[3 * i..][..3].fill(*value);
+                film.coverage[i] = *coverage;
+            }
+            exposure(&Accumulated { film, ..Default::default() })
+        };
+        assert_eq!(image(&[(0.18, 1.0), (0.36, 1.0)]), None);
+        // the average of logarithms, of surfaces alone
+        assert_eq!(image(&[(180.0, 1.0), (0.18, 1.0), (1e9, 0.5)]), Some(-5.0));
+        assert_eq!(image(&[(0.18 / 16.0, 1.0)]), Some(4.0));
+        assert_eq!(image(&[(0.18 / 6.0, 1.0)]), None);
+        // one pixel without light changes little, and none has no exposure
+        assert_eq!(image(&[(0.0, 1.0), (18.0, 1.0), (18.0, 1.0), (18.0, 1.0)]), Some(-5.0));
+        assert_eq!(image(&[(0.0, 1.0)]), None);
+        assert_eq!(image(&[]), None);
+    }
 
     #[test]
     fn what_shows_nothing_is_warned_about() {

@@ -51,7 +51,7 @@ impl Renderer {
     /// # Errors
     /// Those of the settings that do not fit the scene.
     pub fn complete(&mut self, settings: &RenderSettings, camera: Option<Camera>) -> Result<Completed> {
-        self.apply_scene_settings(&settings.scene);
+        self.apply_scene_settings(&settings.scene)?;
         let is_default = settings.lighting == LightingSettings::default();
         let integrator = settings.integrator().get();
         let capabilities = integrator.capabilities();

@@ -240,11 +240,12 @@ impl Renderer {
     }
 
     /// Applies settings that the scene's file leaves open; a change of them builds the tracer anew.
-    pub(crate) fn apply_scene_settings(&mut self, settings: &SceneSettings) {
-        if settings.apply(&mut self.scene) {
+    pub(crate) fn apply_scene_settings(&mut self, settings: &SceneSettings) -> Result<()> {
+        if settings.apply(&mut self.scene)? {
             // the traced scene changes
             self.tracer = None;
         }
+        Ok(())
     }
 
     /// Adds the lights of the settings to the scene, and removes those of the previous settings.

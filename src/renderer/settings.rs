@@ -194,7 +194,7 @@ settings! {
     pub struct PictureSettings {
         /// Tone mapping operator of .png outputs [default: linear]
         tone_map: Option<ToneMap>, option(value_enum), applies(TONE_MAPPED), basic;
-        /// Exposure of .png outputs, in stops [default: 0]
+        /// Exposure of .png outputs, in stops [default: 0, or chosen for a still that shows the scene's own light, if that is far from what a display shows]
         exposure: Option<f64>, option(value_name = "EV", value_parser = parse_number, allow_hyphen_values = true), applies(TONE_MAPPED);
     }
 }

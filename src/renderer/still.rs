@@ -21,10 +21,12 @@ use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
+use crate::integrators::lighting::LightingSettings;
 use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
+use crate::settings::Capability;
 use crate::tracer::{Needs, Tracer};
 
 /// Additional results of a still.
@@ -36,6 +38,9 @@ pub struct StillExtras {
     pub aov: bool,
     /// Make intermediate images at powers of two of samples whatever the settings, for viewers.
     pub intermediate: bool,
+    /// Pictures have no exposure but that of the settings: for frames of a sequence, which must not
+    /// differ in brightness.
+    pub fixed_exposure: bool,
 }
 
 /// A finished still image.
@@ -194,7 +199,7 @@ impl Renderer {
         }
 
         // what there is to say about it
-        let (integrator, picture) = (render.integrator, completed.settings.picture.options());
+        let (integrator, picture) = (render.integrator, render.picture_options(&accumulated));
         let mut report = render.report(tracer, &flat, &accumulated, details, control);
         report.denoise = denoising.as_ref().map(Denoising::report);
         report.seconds.aov = aov_seconds;
@@ -233,6 +238,7 @@ impl<'a> StillRender<'a> {
         let integrator = settings.integrator().get();
         let mut job = settings.job(scene, camera);
         job.samples.keep_rays = extras.keep_rays;
+        job.samples.film.keep_state = settings.film.keeps_state();
         let fingerprint = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
         Self {
             renderer,
@@ -320,17 +326,36 @@ impl<'a> StillRender<'a> {
         control: &mut dyn Control,
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Rendered> {
-        let (integrator, picture) = (self.integrator, self.completed.settings.picture.options());
+        let integrator = self.integrator;
         let mut interval_control = IntervalControl {
             control,
             save: &mut |accumulated, control| {
                 let image = composer.compose(accumulated, control)?;
+                let picture = self.picture_options(accumulated);
                 save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
             },
         };
         let rendered = integrator.render(tracer, flat, &self.job, &mut interval_control)?;
         self.renderer.device.check_validation()?;
         Ok(rendered)
+    }
+
+    /// How pictures of an image show it. Without an exposure in the settings there is one where the
+    /// scene's own light is far from what a display shows.
+    fn picture_options(&self, image: &Accumulated) -> PictureOptions {
+        let options = self.completed.settings.picture.options();
+        self.chosen_exposure(image).map_or(options, |stops| PictureOptions { exposure: stops as f32, ..options })
+    }
+
+    /// The exposure that is chosen for the scene's own light, in stops; `None` for that of the
+    /// settings.
+    fn chosen_exposure(&self, image: &Accumulated) -> Option<f64> {
+        let settings = &self.completed.settings;
+        let shows_own_light = self.integrator.capabilities().contains(&Capability::SceneLights)
+            && settings.lighting == LightingSettings::default()
+            && !self.renderer.lighting.is_automatic;
+        let is_open = settings.picture.exposure.is_none() && !self.extras.fixed_exposure;
+        if shows_own_light && is_open { brightness::exposure(image) } else { None }
     }
 
     /// Writes the report, and hands the warnings about the image to `control`.
@@ -347,7 +372,10 @@ impl<'a> StillRender<'a> {
 
         // warnings, of which those about brightness can be switched off
         let surface_mean = brightness::surface_mean(image, integrator.channels().len());
-        let exposure = f64::from(settings.picture.options().exposure);
+        let exposure = f64::from(self.picture_options(image).exposure);
+        let chosen_exposure = self.chosen_exposure(image).map(|stops| {
+            format!("exposure of pictures: {stops:+} stops, for the light of the scene is far from a display's (--exposure {stops}); --exposure 0 shows it as it is")
+        });
         let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
         details.warnings.iter().for_each(|w| control.warning(w));
         brightness.iter().for_each(|w| control.brightness(w));
@@ -355,7 +383,7 @@ impl<'a> StillRender<'a> {
 
         let (mean, mean_standard_error) = image.film.mean_and_error();
         let compute = tracer.compute_options();
-        let choices = (choices.clone(), self.chosen);
+        let choices = (choices.iter().cloned().chain(chosen_exposure).collect(), self.chosen);
         StillReport {
             setup: Setup::new(self.renderer, tracer, flat, camera, choices, self.warnings),
             integrator: integrator.name(),

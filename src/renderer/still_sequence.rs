@@ -134,8 +134,13 @@ impl StillSequence<'_> {
     pub fn render(&mut self, number: u32, control: &mut dyn Control) -> Result<Still> {
         let started = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
         self.completed.camera = self.pose(number)?;
-        let mut still =
-            self.renderer.still_of(&self.completed, StillExtras::default(), started, control, &mut |_| Ok(()))?;
+        let mut still = self.renderer.still_of(
+            &self.completed,
+            StillExtras { fixed_exposure: true, ..Default::default() },
+            started,
+            control,
+            &mut |_| Ok(()),
+        )?;
         still.image.metadata.push(("frame".into(), number.to_string()));
         still.image.metadata.sort();
         Ok(still)

@@ -37,6 +37,8 @@ pub struct Inventory {
     pub closed_meshes: usize,
     /// Materials that instances use, by model and what it is extended by.
     pub materials: BTreeMap<String, usize>,
+    /// Names of variants of the materials, of which `--variant` chooses one.
+    pub variants: Vec<String>,
     /// Textures.
     pub textures: TextureInventory,
     /// Names of cameras; empty for one without.
@@ -101,6 +103,7 @@ impl Inventory {
             open_edges: of_mesh.iter().map(|m| m.1).sum(),
             closed_meshes: of_mesh.iter().filter(|m| m.0 > 0 && m.1 == 0).count(),
             materials,
+            variants: scene.variants.clone(),
             textures: textures(scene),
             cameras: scene.cameras.iter().map(|c| c.name.clone()).collect(),
             lights: lights(scene),
@@ -156,6 +159,8 @@ fn model(material: &Material) -> String {
         ("transmission", material.transmission.factor > 0.0),
         ("volume", material.transmission.thickness > 0.0),
         ("anisotropy", material.anisotropy.strength != 0.0),
+        ("iridescence", material.iridescence.factor > 0.0),
+        ("diffuse transmission", material.diffuse_transmission.factor > 0.0),
         ("normal map", material.normal_texture.is_some()),
         ("emission", material.emissive.max_element() > 0.0),
         ("alpha mask", matches!(material.alpha_mode, AlphaMode::Mask { .. })),

@@ -153,6 +153,79 @@ pub struct Anisotropy {
     pub texture: Option<TextureSlot>,
 }
 
+/// KHR_materials_iridescence: a thin film over the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iridescence {
+    /// 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (red).
+    pub texture: Option<TextureSlot>,
+    /// Index of refraction of the film.
+    pub ior: f32,
+    /// Thickness in nanometres where the texture is 0, and where it is 1 or missing.
+    pub thickness: [f32; 2],
+    /// Chooses between the two (green).
+    pub thickness_texture: Option<TextureSlot>,
+}
+
+impl Default for Iridescence {
+    fn default() -> Self {
+        Self { factor: 0.0, texture: None, ior: 1.3, thickness: [100.0, 400.0], thickness_texture: None }
+    }
+}
+
+/// KHR_materials_diffuse_transmission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiffuseTransmission {
+    /// Share of what is diffuse that goes to the other side, 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (alpha).
+    pub texture: Option<TextureSlot>,
+    /// Linear colour of what is transmitted, in place of the base colour.
+    pub color: Vec3,
+    /// Multiplies `color` (sRGB texture).
+    pub color_texture: Option<TextureSlot>,
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> Self {
+        Self { factor: 0.0, texture: None, color: Vec3::ONE, color_texture: None }
+    }
+}
+
+/// Materials that replace one another by the variant of a scene (KHR_materials_variants).
+#[derive(Clone, Debug, PartialEq)]
+pub struct VariantMaterials {
+    /// Index of the material without a variant, and in variants that do not replace it.
+    pub base: usize,
+    /// Indices of a variant in [`super::Scene::variants`], and of the material that it has instead.
+    pub replacements: Vec<(usize, usize)>,
+}
+
+impl VariantMaterials {
+    /// Index of the material in a variant, or without one.
+    pub fn material(&self, variant: Option<usize>) -> usize {
+        let replacement = self.replacements.iter().find(|(of, _)| Some(*of) == variant);
+        replacement.map_or(self.base, |(_, material)| *material)
+    }
+
+    /// Indices of all materials that it can be, to change them.
+    pub fn all_mut(&mut self) -> impl Iterator<Item = &mut usize> {
+        std::iter::once(&mut self.base).chain(self.replacements.iter_mut().map(|(_, material)| material))
+    }
+
+    /// Indices of all materials that it can be.
+    pub fn all(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(self.base).chain(self.replacements.iter().map(|(_, material)| *material))
+    }
+}
+
+/// The material of an index, and all that it can be in variants of a scene with these materials.
+pub fn all_variants(materials: &[Material], index: usize) -> Vec<&Material> {
+    let replacements = materials[index].variants.iter().flat_map(VariantMaterials::all);
+    std::iter::once(index).chain(replacements).map(|i| &materials[i]).collect()
+}
+
 /// A surface's appearance. Colours are linear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
@@ -196,6 +269,9 @@ pub struct Material {
     /// `d` of an MTL material where it is below 1 and nothing else says glass: what it means is a
     /// setting ([`super::SceneSettings`]).
     pub mtl_dissolve: Option<f32>,
+    /// Others that it is a copy of, one at a time: which one is a setting
+    /// ([`super::SceneSettings`]).
+    pub variants: Option<VariantMaterials>,
     /// KHR_materials_unlit.
     pub unlit: bool,
     /// KHR_materials_clearcoat.
@@ -212,6 +288,10 @@ pub struct Material {
     pub specular: Specular,
     /// KHR_materials_anisotropy.
     pub anisotropy: Anisotropy,
+    /// KHR_materials_iridescence.
+    pub iridescence: Iridescence,
+    /// KHR_materials_diffuse_transmission.
+    pub diffuse_transmission: DiffuseTransmission,
     /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF
     /// material, unknown statements of an MTL file, `sigma[]` of `.brhan`. docs/materials.md lists
     /// those that are used.
@@ -241,6 +321,7 @@ impl Default for Material {
             specular_color: Vec3::ZERO,
             transmittance: Vec3::ZERO,
             mtl_dissolve: None,
+            variants: None,
             unlit: false,
             clearcoat: Clearcoat::default(),
             sheen: Sheen::default(),
@@ -248,6 +329,8 @@ impl Default for Material {
             dielectric_priority: 0,
             specular: Specular::default(),
             anisotropy: Anisotropy::default(),
+            iridescence: Iridescence::default(),
+            diffuse_transmission: DiffuseTransmission::default(),
             parameters: BTreeMap::new(),
         }
     }
@@ -255,7 +338,7 @@ impl Default for Material {
 
 impl Material {
     /// All texture slots, empty ones included.
-    pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 15] {
+    pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 19] {
         [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,
@@ -272,6 +355,10 @@ impl Material {
             &mut self.specular.texture,
             &mut self.specular.color_texture,
             &mut self.anisotropy.texture,
+            &mut self.iridescence.texture,
+            &mut self.iridescence.thickness_texture,
+            &mut self.diffuse_transmission.texture,
+            &mut self.diffuse_transmission.color_texture,
         ]
     }
 

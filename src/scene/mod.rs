@@ -64,6 +64,10 @@ pub struct LoadReport {
     /// Files that it was read from: models, materials, buffers and images, also those that could
     /// not be read.
     pub files: Vec<PathBuf>,
+    /// Names and texts of what a glTF file says of itself (KHR_xmp_json_ld).
+    pub metadata: Vec<(String, String)>,
+    /// Names of the scenes of a glTF file, of which one is loaded.
+    pub scenes: Vec<String>,
     /// Extensions that a glTF file names.
     pub extensions: Vec<FileExtension>,
     /// Images that were not decoded because [`load::LoadOptions::textures`] said so.
@@ -123,6 +127,8 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
     pub materials: Vec<Material>,
+    /// Names of the variants of materials that a file has (KHR_materials_variants).
+    pub variants: Vec<String>,
     /// Decoded images with their samplers.
     pub textures: Vec<Texture>,
     /// Punctual and spherical lights.

@@ -2,6 +2,7 @@
 
 use super::Scene;
 use super::material::{AlphaMode, Material, MaterialKind};
+use crate::error::{Error, Result};
 use crate::settings::{AppliesTo, choices, settings};
 
 choices! {
@@ -33,20 +34,54 @@ settings! {
     pub struct SceneSettings {
         /// What `d` below 1 means in an .mtl file without anything else that says glass [default: alpha]
         mtl_dissolve: Option<MtlDissolve>, option(value_enum), applies(AppliesTo::ALL);
+        /// Variant of the materials, by its name or its number from 0, of files that have several [default: none]
+        variant: Option<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL), basic;
     }
 }
 
 impl SceneSettings {
     /// Applies them to a loaded scene, whatever was applied before. Returns true if that has
     /// changed it.
-    pub fn apply(&self, scene: &mut Scene) -> bool {
-        let meaning = self.mtl_dissolve.unwrap_or_default();
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a variant that the scene does not have; nothing is changed then.
+    pub fn apply(&self, scene: &mut Scene) -> Result<bool> {
+        let variant = self.variant.as_deref().map(|text| find_variant(&scene.variants, text)).transpose()?;
         let mut has_changed = false;
+
+        // what `d` means
+        let meaning = self.mtl_dissolve.unwrap_or_default();
         for material in scene.materials.iter_mut().filter(|m| m.mtl_dissolve.is_some()) {
             let before = material.alpha_mode;
             meaning.apply_to(material);
             has_changed |= material.alpha_mode != before;
         }
-        has_changed
+
+        // the variant
+        for i in 0..scene.materials.len() {
+            let Some(variants) = scene.materials[i].variants.clone() else { continue };
+            let copied = scene.materials[variants.material(variant)].clone();
+            let copy = Material { variants: Some(variants), ..copied };
+            has_changed |= scene.materials[i] != copy;
+            scene.materials[i] = copy;
+        }
+        Ok(has_changed)
     }
+}
+
+/// Index of a variant by its name or, where none is called that, its number.
+pub fn variant_index(names: &[String], text: &str) -> Option<usize> {
+    let number = || text.parse().ok().filter(|n| *n < names.len());
+    names.iter().position(|name| name == text).or_else(number)
+}
+
+/// [`variant_index`], or an error that names the variants.
+fn find_variant(names: &[String], text: &str) -> Result<usize> {
+    variant_index(names, text).ok_or_else(|| {
+        Error::Usage(if names.is_empty() {
+            format!("--variant {text}: the scene has no variants")
+        } else {
+            format!("--variant {text}: the scene has no such variant, but {}", names.join(", "))
+        })
+    })
 }

@@ -71,7 +71,7 @@ impl TextureFeature {
     /// The encoding of the texture, as shaders/path/shading.glsl reads it.
     pub(super) fn texels(self) -> Texels {
         match self {
-            Self::Emission | Self::SheenColor | Self::SpecularColor => Texels::Srgb,
+            Self::Emission | Self::SheenColor | Self::SpecularColor | Self::DiffuseTransmissionColor => Texels::Srgb,
             Self::MetallicRoughness
             | Self::Normal
             | Self::Clearcoat
@@ -81,7 +81,10 @@ impl TextureFeature {
             | Self::Transmission
             | Self::Specular
             | Self::Anisotropy
-            | Self::Occlusion => Texels::Linear,
+            | Self::Occlusion
+            | Self::Iridescence
+            | Self::IridescenceThickness
+            | Self::DiffuseTransmission => Texels::Linear,
         }
     }
 
@@ -101,6 +104,10 @@ impl TextureFeature {
             Self::SpecularColor => m.specular.color_texture,
             Self::Anisotropy => m.anisotropy.texture,
             Self::Occlusion => m.occlusion_texture,
+            Self::Iridescence => m.iridescence.texture,
+            Self::IridescenceThickness => m.iridescence.thickness_texture,
+            Self::DiffuseTransmission => m.diffuse_transmission.texture,
+            Self::DiffuseTransmissionColor => m.diffuse_transmission.color_texture,
         }
     }
 }
@@ -201,6 +208,8 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             (walls(m) == TransmissionMode::Volume, MaterialFeature::Volumes),
             (absorbs(m), MaterialFeature::Absorption),
             (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
+            (gltf && m.iridescence.factor > 0.0, MaterialFeature::Iridescence),
+            (gltf && m.diffuse_transmission.factor > 0.0, MaterialFeature::DiffuseTransmission),
             (normal_maps, MaterialFeature::ShadingNormals),
             (separate, MaterialFeature::SeparateTangents),
             (varies, MaterialFeature::BaseColors),
@@ -251,6 +260,11 @@ pub(super) fn record(
         priority: m.dielectric_priority,
         parameters: parameters(m),
         occlusion_strength: m.occlusion_strength,
+        iridescence: m.iridescence.factor,
+        iridescence_thickness: m.iridescence.thickness,
+        iridescence_ior: m.iridescence.ior,
+        diffuse_transmission: m.diffuse_transmission.factor,
+        diffuse_transmission_color: m.diffuse_transmission.color.to_array(),
         reserved: [0; 3],
         uses: slots(m, needs).map(texture),
     }

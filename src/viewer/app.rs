@@ -29,6 +29,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
+use crate::scene::settings::variant_index;
 use crate::scene::{Camera, Projection};
 use crate::settings::{Capability, Length};
 use crate::tracer::DeviceSettings;
@@ -197,6 +198,8 @@ pub struct App {
     given: RenderSettings,
     /// The animation to start with, by index or name, and its time.
     first_animation: Option<(String, f64)>,
+    /// Which scene of a glTF file is shown; none: the one that the file names.
+    pub gltf_scene: Option<String>,
     /// Text to be put on the clipboard.
     pub copied: Option<String>,
     /// The window is to be closed.
@@ -260,6 +263,7 @@ impl App {
             frames: VecDeque::new(),
             given: RenderSettings::default(),
             first_animation: None,
+            gltf_scene: options.gltf_scene.clone(),
             copied: None,
             closes: false,
             default_frame_rate: options.frame_rate.unwrap_or(CPU_FRAME_RATE),
@@ -358,6 +362,9 @@ impl App {
     pub fn open(&mut self, source: &str) {
         self.last_load += 1;
         self.load = self.last_load;
+        if self.source.as_deref().is_some_and(|before| before != source) {
+            self.gltf_scene = None;
+        }
         self.source = Some(source.to_owned());
         (self.modified, self.failure) = (None, None);
         self.loading = Some((format!("loading {source}"), None));
@@ -594,6 +601,11 @@ impl App {
                 None => (self.playback.animation, self.playback.runs) = (None, false),
             }
         }
+        // nor are variants of another file those of this one
+        let chosen = &mut self.settings.scene.variant;
+        if chosen.as_deref().is_some_and(|text| variant_index(&summary.variants, text).is_none()) {
+            *chosen = None;
+        }
         self.scene = Some(summary);
     }
 
@@ -723,6 +735,7 @@ impl App {
         // a request like the last one changes nothing
         let request = Request {
             scene: self.source.clone(),
+            gltf_scene: self.gltf_scene.clone(),
             load: self.load,
             device: self.device_settings.clone(),
             meaning: self.settings.scene.clone(),

@@ -25,6 +25,8 @@ crate::settings::choices! {
 pub struct ViewOptions {
     /// The scene, a file or `builtin:NAME`; none: the viewer asks for one.
     pub scene: Option<String>,
+    /// Which scene of a glTF file; none: the one that the file names.
+    pub gltf_scene: Option<String>,
     /// Where the files lie that a scene may refer to, of scenes that are opened later, too.
     pub confine: Confine<'static>,
     /// Settings of images.

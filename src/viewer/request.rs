@@ -27,6 +27,8 @@ pub const TRUTH: Pane = 2;
 pub struct Request {
     /// The scene, a file or `builtin:NAME`; none before one is opened.
     pub scene: Option<String>,
+    /// Which scene of a glTF file; none: the one that the file names.
+    pub gltf_scene: Option<String>,
     /// Incremented to load the scene anew.
     pub load: u64,
     /// Device and tracer.
@@ -172,6 +174,10 @@ pub struct SceneSummary {
     pub cameras: Vec<Camera>,
     /// Names and durations, in seconds, of its animations.
     pub animations: Vec<(String, f64)>,
+    /// Names of the scenes of its file, if it is a glTF file.
+    pub scenes: Vec<String>,
+    /// Names of variants of its materials.
+    pub variants: Vec<String>,
     /// Names of textures.
     pub textures: Vec<String>,
     /// Number of triangles and spheres over all instances.

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::json;
+use skylit::scene::load::{LoadOptions, load_with};
 
 use crate::build::*;
 
@@ -374,4 +375,37 @@ fn tangents_split_vertices_where_texcoords_mirror() {
     assert_eq!(corners(m)[1], [QUAD[1], QUAD[3], QUAD[2]]);
     let handedness = |t: usize| m.indices[t].map(|i| m.tangents[i as usize].w);
     assert_eq!((handedness(0), handedness(1)), ([-1.0; 3], [1.0; 3]));
+}
+
+/// A file with two scenes: which one is loaded is an option.
+#[test]
+fn scenes_of_a_file() {
+    let mut doc = Doc::triangle();
+    let nodes: Vec<usize> =
+        ["a", "b", "c"].iter().map(|name| doc.push("nodes", json!({ "name": name, "mesh": 0 }))).collect();
+    doc.json["scenes"] = json!([
+        { "name": "first", "nodes": [nodes[0]] }, { "name": "second", "nodes": [nodes[1], nodes[2]] }, { "name": "0", "nodes": [nodes[2]] },
+    ]);
+    doc.json["scene"] = json!(1);
+    let folder = Folder::new();
+    let path = folder.write("scenes.gltf", doc.gltf());
+    let source = path.to_str().unwrap();
+    let load = |scene| load_with(source, &LoadOptions { scene, ..Default::default() });
+    let names = |scene| load(scene).unwrap().instances.iter().map(|i| i.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(None), ["b", "c"]);
+    assert_eq!(names(Some("first")), ["a"]);
+    assert_eq!(names(Some("1")), ["b", "c"]);
+    // a name prevails over a number
+    assert_eq!(names(Some("0")), ["c"]);
+    let scene = load(Some("first")).unwrap();
+    assert_eq!(
+        (scene.name.as_str(), &scene.report.scenes[..]),
+        ("scenes.gltf, scene first", &["first", "second", "0"].map(str::to_owned)[..])
+    );
+
+    // what there is not
+    let error = |scene| load(Some(scene)).map(|_| ()).unwrap_err().to_string();
+    assert!(error("3").contains("--gltf-scene 3: no such scene, but 0 `first`, 1 `second`"), "{}", error("3"));
+    let other = load_with("builtin:atrium", &LoadOptions { scene: Some("0"), ..Default::default() });
+    assert!(other.map(|_| ()).unwrap_err().to_string().contains("no glTF file"));
 }

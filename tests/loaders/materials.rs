@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
 use skylit::scene::material::{AlphaMode, Material, TextureSlot};
-use skylit::scene::{Filter, Scene, TexelData, Wrap};
+use skylit::scene::{Filter, Geometry, Scene, SceneSettings, TexelData, Wrap};
 
 use crate::build::*;
 
@@ -175,6 +175,79 @@ fn extensions_have_defaults() {
     assert_eq!((m.transmission.attenuation_color, m.transmission.attenuation_distance), (Vec3::ONE, f32::INFINITY));
 }
 
+/// Two triangles, of which the first has other materials in variants.
+fn with_variants() -> Doc {
+    let mut doc = with_material(json!({ "name": "base" }));
+    let normal_map = json!({ "name": "night", "normalTexture": { "index": 1, "texCoord": 1 },
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } } });
+    doc.push("materials", normal_map);
+    doc.push("materials", json!({ "name": "winter", "emissiveFactor": [1, 2, 3] }));
+    let (primitive, base) = (doc.first().clone(), doc.first().clone());
+    doc.json["meshes"][0]["primitives"] = json!([primitive, base]);
+    doc.first()["extensions"]["KHR_materials_variants"] =
+        json!({ "mappings": [{ "material": 1, "variants": [0, 2] }, { "material": 2, "variants": [1] }] });
+    let names = json!([{ "name": "at night" }, { "name": "in winter" }, { "name": "0" }]);
+    doc.json["extensions"]["KHR_materials_variants"]["variants"] = names;
+    doc.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    doc.json["extensionsRequired"] = json!(["KHR_materials_variants"]);
+    doc
+}
+
+#[test]
+fn variants() {
+    let mut scene = with_variants().load();
+    assert_eq!(scene.variants, ["at night", "in winter", "0"]);
+    assert!(!scene.report.extensions[0].ignored);
+    let shown = |scene: &Scene| {
+        scene.instances.iter().map(|i| scene.materials[scene.meshes[i.mesh].material].name.clone()).collect::<Vec<_>>()
+    };
+    let apply = |scene: &mut Scene, variant: Option<&str>| {
+        SceneSettings { variant: variant.map(str::to_owned), ..Default::default() }.apply(scene)
+    };
+    assert_eq!(shown(&scene), ["base", "base"]);
+
+    // one after another, by name, then by number; a name prevails
+    for (variant, name, changes) in [
+        (Some("in winter"), "winter", true),
+        (Some("1"), "winter", false),
+        (Some("at night"), "night", true),
+        (Some("0"), "night", false),
+        (None, "base", true),
+        (None, "base", false),
+    ] {
+        assert_eq!(apply(&mut scene, variant).unwrap(), changes, "{variant:?}");
+        assert_eq!(shown(&scene), [name, "base"], "{variant:?}");
+    }
+
+    // what a variant needs of a mesh is there: tangents, and no set of coordinates is missing
+    let Geometry::Triangles(triangles) = &scene.meshes[scene.instances[0].mesh].geometry else { panic!() };
+    assert_eq!(triangles.tangents.len(), triangles.positions.len());
+    let Geometry::Triangles(triangles) = &scene.meshes[scene.instances[1].mesh].geometry else { panic!() };
+    assert!(triangles.tangents.is_empty());
+
+    // what there is not
+    apply(&mut scene, Some("in winter")).unwrap();
+    let error = apply(&mut scene, Some("in spring")).unwrap_err().to_string();
+    assert!(error.contains("in spring") && error.contains("at night, in winter, 0"), "{error}");
+    assert_eq!(shown(&scene), ["winter", "base"]);
+    let mut plain = with_material(json!({})).load();
+    assert!(apply(&mut plain, Some("0")).unwrap_err().to_string().contains("no variants"));
+}
+
+#[test]
+fn variants_that_do_not_exist() {
+    for (mapping, expected) in [
+        (json!({ "material": 3, "variants": [0] }), "material 3"),
+        (json!({ "material": 1, "variants": [3] }), "variant 3"),
+        (json!({ "material": 1 }), "KHR_materials_variants"),
+    ] {
+        let mut doc = with_variants();
+        doc.first()["extensions"]["KHR_materials_variants"]["mappings"] = json!([mapping]);
+        let error = doc.error();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
 #[test]
 fn texture_transform() {
     let slot = |transform: Value| {
@@ -201,11 +274,41 @@ fn texture_transform() {
     assert_eq!(material(&doc.load()).textures().filter(|t| *t == s).count(), 5);
 }
 
+/// A primitive keeps the two sets that its material uses, whatever their numbers.
 #[test]
-fn third_texture_coordinates_are_refused_politely() {
-    let scene = with_material(json!({ "emissiveTexture": { "index": 0, "texCoord": 2 } })).load();
-    assert_eq!(material(&scene).emissive_texture.unwrap().texcoord, 0);
-    assert_eq!(scene.report.warnings.len(), 1);
+fn sets_of_texture_coordinates() {
+    let load = |material: Value| {
+        let mut doc = with_material(material);
+        for set in 2..6u8 {
+            let texcoord = doc.accessor(&bytes(&[[f32::from(set); 2]; 3]), F32, "VEC2", 3);
+            doc.first()["attributes"][format!("TEXCOORD_{set}")] = json!(texcoord);
+        }
+        doc.load()
+    };
+    let of_mesh = |scene: &Scene| scene.materials[scene.meshes[0].material].clone();
+    let slot = |set: u32| json!({ "index": 0, "texCoord": set });
+
+    // one above the first two, alone and beside another
+    let scene = load(json!({ "emissiveTexture": slot(3) }));
+    assert_eq!(of_mesh(&scene).emissive_texture.unwrap().texcoord, 0);
+    assert_eq!(mesh(&scene, 0).texcoords[0], [Vec2::splat(3.0); 3]);
+    let scene = load(json!({ "emissiveTexture": slot(4), "occlusionTexture": slot(1) }));
+    let material = of_mesh(&scene);
+    assert_eq!([material.occlusion_texture, material.emissive_texture].map(|s| s.unwrap().texcoord), [0, 1]);
+    assert_eq!(mesh(&scene, 0).texcoords[1], [Vec2::splat(4.0); 3]);
+    assert_eq!(mesh(&scene, 0).texcoords[0], TRIANGLE.map(|p| Vec2::new(p[0], p[1])));
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+
+    // a third one is replaced by the first, and named
+    let scene = load(json!({ "emissiveTexture": slot(2), "occlusionTexture": slot(3), "normalTexture": slot(5) }));
+    let material = of_mesh(&scene);
+    let slots = [material.emissive_texture, material.occlusion_texture, material.normal_texture];
+    assert_eq!(slots.map(|s| s.unwrap().texcoord), [0, 1, 0]);
+    assert!(
+        scene.report.warnings.len() == 1 && scene.report.warnings[0].contains("set 5"),
+        "{:?}",
+        scene.report.warnings
+    );
 }
 
 #[test]

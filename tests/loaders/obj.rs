@@ -487,15 +487,15 @@ fn dissolve_as_glass() {
     let folder = Folder::new();
     let mut scene = with_mtl(&folder, "newmtl m\nKd 1 0 0\nd 0.5\nTf 0.5 0.5 0.5\nnewmtl n\nnewmtl k\nillum 7\n");
     let before = scene.materials.clone();
-    let glass = SceneSettings { mtl_dissolve: Some(MtlDissolve::Glass) };
-    assert!(glass.apply(&mut scene) && !glass.apply(&mut scene));
+    let glass = SceneSettings { mtl_dissolve: Some(MtlDissolve::Glass), ..Default::default() };
+    assert!(glass.apply(&mut scene).unwrap() && !glass.apply(&mut scene).unwrap());
     let m = &scene.materials[0];
     assert_eq!(
         (m.kind, m.alpha_mode, m.base_color.w, m.transmission.factor),
         (MaterialKind::Glass, AlphaMode::Opaque, 1.0, 1.0)
     );
     assert_eq!((m.transmittance, &scene.materials[1..]), (Vec3::splat(0.5), &before[1..]));
-    assert!(SceneSettings::default().apply(&mut scene));
+    assert!(SceneSettings::default().apply(&mut scene).unwrap());
     assert_eq!(scene.materials, before);
 }
 
@@ -622,4 +622,20 @@ fn what_is_missing_is_said() {
 fn other_encodings_and_line_ends() {
     let scene = Folder::new().load("a.OBJ", b"o caf\xe9\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n").unwrap();
     assert_eq!(scene.triangle_count(), 1);
+}
+
+/// The layers of Blender's and other programs' MTL files.
+#[test]
+fn clearcoat_sheen_and_anisotropy() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl layers\nKd 1 0 0\nPr 0.4\nPc 0.75\nPcr 0.25\nPs 0.5\naniso 0.8\nanisor 0.25\nnewmtl none\nPc 0\nPs 0\naniso 0\n");
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl layers\nf 1 2 3\nusemtl none\nf 1 2 3\n";
+    let scene = folder.load("a.obj", text).unwrap();
+    let material = |name: &str| scene.materials.iter().find(|m| m.name == name).unwrap().clone();
+    let layers = material("layers");
+    assert_eq!((layers.clearcoat.factor, layers.clearcoat.roughness), (0.75, 0.25));
+    assert_eq!((layers.sheen.color, layers.sheen.roughness), (glam::Vec3::splat(0.5), 0.5));
+    assert_eq!((layers.anisotropy.strength, layers.anisotropy.rotation), (0.8, std::f32::consts::FRAC_PI_2));
+    let none = material("none");
+    assert_eq!((none.clearcoat, none.sheen, none.anisotropy), Default::default());
 }

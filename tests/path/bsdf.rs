@@ -5,7 +5,7 @@ use super::*;
 use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::interface::records::ray_set;
 use skylit::scene::TriangleMesh;
-use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
+use skylit::scene::material::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, Specular, Transmission};
 use skylit::shaders;
 use skylit::tracer::{Push, Stream};
 use std::f64::consts::PI;
@@ -122,6 +122,11 @@ pub(super) fn cases() -> Vec<Case> {
         ior: 1.5,
         ..Material::default()
     };
+    let film =
+        |factor, nanometres, ior| Iridescence { factor, thickness: [0.0, nanometres], ior, ..Default::default() };
+    let translucent =
+        |factor, color: f32| DiffuseTransmission { factor, color: Vec3::splat(color), ..Default::default() };
+    let no_specular = grey(0.0, 1.0);
     let rough = |sigma| Material { parameters: [("sigma".to_owned(), sigma)].into(), ..matte(1.0) };
     let ior = |eta: f64, c: Case| Case { eta: Some(eta), ..c };
     vec![
@@ -159,6 +164,37 @@ pub(super) fn cases() -> Vec<Case> {
                 ..case("smooth volume", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.0) })
             },
         ),
+        case("film over plastic", Material { iridescence: film(1.0, 380.0, 1.3), ..gltf(0.0, 0.4) }),
+        case("film over half metal", Material { iridescence: film(0.7, 550.0, 1.8), ..gltf(0.5, 0.5) }),
+        case("film over smooth metal", Material { iridescence: film(1.0, 300.0, 1.4), ..gltf(1.0, 0.0) }),
+        case(
+            "film over thin walls",
+            Material { iridescence: film(1.0, 420.0, 1.4), transmission: through(0.9, 0.0), ..gltf(0.0, 0.4) },
+        ),
+        ior(
+            1.5,
+            case(
+                "film over volume 0.5",
+                Material { iridescence: film(1.0, 420.0, 1.4), transmission: through(1.0, 1.0), ..gltf(0.0, 0.5) },
+            ),
+        ),
+        case("translucent", Material { diffuse_transmission: translucent(0.6, 0.8), ..gltf(0.0, 0.5) }),
+        case(
+            "translucent, thin walls, sheen",
+            Material {
+                diffuse_transmission: translucent(0.6, 0.8),
+                transmission: through(0.4, 0.0),
+                sheen: sheen(0.5),
+                ..gltf(0.2, 0.5)
+            },
+        ),
+        Case {
+            conserves: Some(0.0),
+            ..case(
+                "translucent alone",
+                Material { diffuse_transmission: translucent(0.3, 1.0), specular: no_specular, ..gltf(0.0, 1.0) },
+            )
+        },
         ior(1.5, case("rough glass", brhan(MaterialKind::Glass, 0.6))),
         ior(1.5, Case { conserves: Some(1e-3), ..case("smooth glass", brhan(MaterialKind::Glass, 0.0)) }),
         case("copper", brhan(MaterialKind::Copper, 0.4)),
@@ -559,6 +595,96 @@ fn gpu_narrow_lobes_follow_their_density() {
             assert!(chi < 5.0, "{what}: samples do not follow their density: {chi} standard deviations");
             assert!(roughness > 0.032 || (albedo - 1.0).abs() < 1e-3, "{what}: {albedo}");
         }
+    }
+    assert_validation_clean(&device);
+}
+
+/// Reflectance of a film by the phase between its two reflections, exactly: Fresnel's amplitudes of both polarizations and Airy's sum over reflections.
+fn airy(film: f64, base: f64, cosine: f64, phase: f64) -> f64 {
+    let (c1, c2, c3) = (cosine, cosine_in(film, cosine), cosine_in(base, cosine));
+    let reflectance = |upper: f64, lower: f64| {
+        let product = upper * lower;
+        let both = 2.0 * product * phase.cos();
+        (upper * upper + lower * lower + both) / (1.0 + product * product + both)
+    };
+    let perpendicular = |n: f64, c: f64, m: f64, d: f64| (n * c - m * d) / (n * c + m * d);
+    let parallel = |n: f64, c: f64, m: f64, d: f64| (m * c - n * d) / (m * c + n * d);
+    let s = reflectance(perpendicular(1.0, c1, film, c2), perpendicular(film, c2, base, c3));
+    let p = reflectance(parallel(1.0, c1, film, c2), parallel(film, c2, base, c3));
+    0.5 * (s + p)
+}
+
+/// Cosine of light within a medium of this index that had `cosine` outside.
+fn cosine_in(index: f64, cosine: f64) -> f64 {
+    (1.0 - (1.0 - cosine * cosine) / (index * index)).sqrt()
+}
+
+/// The eye's sensitivities at a wavelength, by a fit of their own (Wyman, Sloan, Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions", JCGT 2013).
+fn sensitivities(wavelength: f64) -> DVec3 {
+    let lobe = |area: f64, mean: f64, below: f64, above: f64| {
+        let t = (wavelength - mean) / if wavelength < mean { below } else { above };
+        area * (-0.5 * t * t).exp()
+    };
+    DVec3::new(
+        lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2),
+        lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1),
+        lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8),
+    )
+}
+
+/// Colours of thin films against interference that is integrated over the spectrum: the shader's closed form has Schlick's Fresnel terms, two orders and Gaussians.
+#[test]
+fn gpu_colours_of_thin_films() {
+    let device = device();
+    let films = [(250.0, 1.33, 0.5), (380.0, 1.33, 0.04), (500.0, 1.33, 0.9), (300.0, 1.8, 0.04), (550.0, 2.0, 0.6)];
+    let material = |&(nanometres, ior, f0): &(f32, f32, f32)| Material {
+        iridescence: Iridescence { factor: 1.0, ior, thickness: [0.0, nanometres], ..Default::default() },
+        base_color: glam::Vec4::new(f0, f0, f0, 1.0),
+        ..gltf(1.0, 0.0)
+    };
+    let case = |film| Case { name: "film", material: material(film), reciprocal: true, conserves: None, eta: None };
+    let cases: Vec<Case> = films.iter().map(case).collect();
+    let scene = scene(&cases);
+    let flat = FlatScene::for_paths(&scene);
+    let to_srgb = glam::DMat3::from_cols(
+        DVec3::new(3.2404542, -0.9692660, 0.0556434),
+        DVec3::new(-1.5371385, 1.8760108, -0.2040259),
+        DVec3::new(-0.4985314, 0.0415560, 1.0572252),
+    );
+    for kind in tracers(&device) {
+        let probe = Probe::new(&device, tracer(&device, kind, &flat));
+        let mut worst = 0.0f64;
+        for (part, &(nanometres, ior, f0)) in (0u32..).zip(&films) {
+            let base = (1.0 + f64::from(f0).sqrt()) / (1.0 - f64::from(f0).sqrt());
+            for cosine in [1.0, 0.9, 0.7, 0.5] {
+                let at = |phase: f64| airy(ior.into(), base, cosine, phase);
+                // what does not depend on the wavelength is the same in all channels
+                let mean = (0..256).map(|k| at(2.0 * PI * f64::from(k) / 256.0)).sum::<f64>() / 256.0;
+                let path = 2.0 * f64::from(ior) * f64::from(nanometres) * cosine_in(ior.into(), cosine);
+                let (mut sum, mut white) = (DVec3::ZERO, 0.0);
+                for wavelength in (360..=830).map(f64::from) {
+                    sum += sensitivities(wavelength) * (at(2.0 * PI * path / wavelength) - mean);
+                    white += sensitivities(wavelength).y;
+                }
+                let expected = (DVec3::splat(mean) + to_srgb * (sum / white)).clamp(DVec3::ZERO, DVec3::ONE);
+                let found = probe.ask(part, from_above(cosine, 0.3), DVec3::Z, &[Ask::Sample([0.5, 0.5, 0.1])])[0];
+                assert!(found.delta);
+                let off = (found.weight - expected).abs().max_element();
+                worst = worst.max(off);
+                // Schlick's term is farthest from both polarizations' mean at grazing angles
+                let bound = if cosine >= 0.9 { 0.035 } else { 0.08 };
+                assert!(
+                    off < bound,
+                    "{kind} {nanometres} nm of {ior} over {f0}, cosine {cosine}: {:.3}, {expected:.3}",
+                    found.weight
+                );
+                println!(
+                    "{kind} {nanometres} nm of {ior} over {f0}, cosine {cosine}: {:.3}, {expected:.3}",
+                    found.weight
+                );
+            }
+        }
+        println!("{kind}: at most off by {worst:.4}");
     }
     assert_validation_clean(&device);
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use skylit::scene::builtin::shapes;
+use skylit::scene::material::{DiffuseTransmission, Specular};
 
 const ALBEDO: f32 = 0.6;
 const RHO: f64 = 0.6;
@@ -63,6 +64,55 @@ fn gpu_points_spots_and_directions() {
     all.lights.push(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     all.lights.push(light(spot, DVec3::Y, DVec3::NEG_Y, 5.0));
     holds(&device, "three lights", &all, &options(Strategy::Mis, 1024), reflected * (3.0 * 0.8 * 2.0 + 5.0), 1e-2);
+}
+
+/// Light from below a floor that transmits diffusely: color times share times irradiance over pi, of every light and by every strategy; and light from above is reflected by the
+/// rest.
+#[test]
+fn gpu_light_through_a_translucent_floor() {
+    let device = device();
+    let (share, color, at) = (0.7f32, 0.5f32, DVec3::new(0.6, -0.8, 0.0));
+    let through = DiffuseTransmission { factor: share, color: Vec3::splat(color), ..Default::default() };
+    let floor = Material {
+        base_color: glam::Vec4::new(ALBEDO, ALBEDO, ALBEDO, 1.0),
+        diffuse_transmission: through,
+        specular: Specular { factor: 0.0, ..Default::default() },
+        ..Material::default()
+    };
+    let scene = |light: Option<Light>, sky: f32| {
+        let mut scene = floor_and(Vec::new());
+        let material = scene.meshes[0].material;
+        scene.materials[material] = floor.clone();
+        scene.lights.extend(light);
+        scene.environment = Environment::Uniform(Vec3::splat(sky));
+        scene
+    };
+    let transmitted = f64::from(share * color);
+    let irradiance = 3.0 * 0.8 / std::f64::consts::PI;
+    let below = light(LightKind::Point, at, -at, 3.0);
+    holds(
+        &device,
+        "a point below",
+        &scene(Some(below), 0.0),
+        &options(Strategy::Mis, 16),
+        transmitted * irradiance,
+        1e-3,
+    );
+    let sun = light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, -at, 3.0);
+    holds(&device, "a sun below", &scene(Some(sun), 0.0), &options(Strategy::Mis, 16), transmitted * irradiance, 1e-3);
+    let above = light(LightKind::Point, -at, at, 3.0);
+    let reflected = f64::from(ALBEDO * (1.0 - share));
+    holds(
+        &device,
+        "a point above",
+        &scene(Some(above), 0.0),
+        &options(Strategy::Mis, 16),
+        reflected * irradiance,
+        1e-3,
+    );
+    for strategy in [Strategy::Mis, Strategy::Light, Strategy::Bsdf] {
+        holds(&device, "a sky all around", &scene(None, 1.0), &options(strategy, 256), transmitted + reflected, 1e-2);
+    }
 }
 
 /// LEDs, whose intensity is a power of the cosine: half at their half angle, that power elsewhere, nothing behind them.

@@ -11,7 +11,9 @@ use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
 use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
-use skylit::scene::material::{AlphaMode, Anisotropy, Clearcoat, Sheen, Specular, TextureSlot, Transmission};
+use skylit::scene::material::{
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, Specular, TextureSlot, Transmission,
+};
 use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
 
 /// All BSDFs, textures in all slots, alpha of both kinds, and lights of all kinds: so many that a tree chooses among them.
@@ -36,6 +38,13 @@ fn everything() -> Scene {
         transmission: Transmission { factor: 0.5, texture: slot, ..Default::default() },
         specular: Specular { texture: slot, color_texture: slot, ..Default::default() },
         anisotropy: Anisotropy { strength: 0.5, texture: slot, ..Default::default() },
+        iridescence: Iridescence { factor: 0.5, texture: slot, thickness_texture: slot, ..Default::default() },
+        diffuse_transmission: DiffuseTransmission {
+            factor: 0.5,
+            texture: slot,
+            color_texture: slot,
+            ..Default::default()
+        },
         alpha_mode: AlphaMode::Blend,
         ..Material::default()
     };

@@ -31,6 +31,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
     let (sender, events) = std::sync::mpsc::channel();
     let options = ViewOptions {
         scene: scene.map(str::to_owned),
+        gltf_scene: None,
         confine: Default::default(),
         settings,
         device: Default::default(),

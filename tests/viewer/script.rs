@@ -11,6 +11,7 @@ use skylit::viewer::{ViewOptions, headless};
 fn options(scene: Option<&str>) -> ViewOptions {
     ViewOptions {
         scene: scene.map(str::to_owned),
+        gltf_scene: None,
         confine: Default::default(),
         settings: RenderSettings::default(),
         device: DeviceSettings::default(),

@@ -108,7 +108,7 @@ impl RenderArgs {
     /// Those of [`RenderSettings::load`] and [`ConfigArgs::files`].
     pub fn with_files(&self) -> Result<(Self, Vec<DefaultsReport>)> {
         let settings = self.settings.over_file(self.settings_file.as_deref())?;
-        let files = self.config.files(Some(&self.scene), self.load.options().confine)?;
+        let files = self.config.files(Some(&self.scene), self.load.confine())?;
         let is_frames = settings.realtime_setting().is_some();
         let holds = |settings: &RenderSettings| {
             let is_same_kind = settings.realtime_setting().is_some() == is_frames;

@@ -144,6 +144,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
         keep_rays: args.dump_rays.is_some(),
         aov: args.depth_image.is_some(),
         intermediate: viewer.tev.is_some(),
+        fixed_exposure: false,
     };
     let still = renderer.still_with(&args.settings, extras, &mut control, &mut |partial| {
         viewer.show(partial.image);

@@ -58,6 +58,16 @@ records! {
         parameters: vec2,
         /// Strength of the occlusion texture, 0 to 1.
         occlusion_strength: float,
+        /// Iridescence factor (KHR_materials_iridescence).
+        iridescence: float,
+        /// Thickness of the thin film where its texture is 0 and where it is 1, nanometres.
+        iridescence_thickness: vec2,
+        /// Colour of light that is transmitted diffusely (KHR_materials_diffuse_transmission).
+        diffuse_transmission_color: vec3,
+        /// Diffuse transmission factor.
+        diffuse_transmission: float,
+        /// Index of refraction of the thin film.
+        iridescence_ior: float,
         /// Padding to a multiple of 16 bytes.
         reserved: uint[3],
         /// Textures other than the base colour's, indexed by `TextureFeature`.

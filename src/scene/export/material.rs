@@ -103,6 +103,8 @@ impl Writer<'_> {
         if m.ior != 1.5 {
             self.extension("KHR_materials_ior", json!({ "ior": m.ior }));
         }
+
+        // layers over the surface
         let coat = &m.clearcoat;
         if *coat != Default::default() {
             let mut e = json!({ "clearcoatFactor": coat.factor, "clearcoatRoughnessFactor": coat.roughness });
@@ -121,6 +123,8 @@ impl Writer<'_> {
             self.texture(&mut e, "sheenRoughnessTexture", &sheen.roughness_texture);
             self.extension("KHR_materials_sheen", e);
         }
+
+        // what the surface itself reflects and lets through
         self.transmission(&m.transmission);
         let specular = &m.specular;
         if *specular != Default::default() {
@@ -134,6 +138,27 @@ impl Writer<'_> {
             let mut e = json!({ "anisotropyStrength": anisotropy.strength, "anisotropyRotation": anisotropy.rotation });
             self.texture(&mut e, "anisotropyTexture", &anisotropy.texture);
             self.extension("KHR_materials_anisotropy", e);
+        }
+        let film = &m.iridescence;
+        if *film != Default::default() {
+            let [least, most] = film.thickness;
+            let mut e = json!({
+                "iridescenceFactor": film.factor, "iridescenceIor": film.ior,
+                "iridescenceThicknessMinimum": least, "iridescenceThicknessMaximum": most,
+            });
+            self.texture(&mut e, "iridescenceTexture", &film.texture);
+            self.texture(&mut e, "iridescenceThicknessTexture", &film.thickness_texture);
+            self.extension("KHR_materials_iridescence", e);
+        }
+        let through = &m.diffuse_transmission;
+        if *through != Default::default() {
+            let mut e = json!({
+                "diffuseTransmissionFactor": through.factor,
+                "diffuseTransmissionColorFactor": through.color.to_array(),
+            });
+            self.texture(&mut e, "diffuseTransmissionTexture", &through.texture);
+            self.texture(&mut e, "diffuseTransmissionColorTexture", &through.color_texture);
+            self.extension("KHR_materials_diffuse_transmission", e);
         }
     }
 

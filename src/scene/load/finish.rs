@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::Deformation;
+use crate::scene::material::{VariantMaterials, all_variants};
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Smallest extent of a scene: below it products of lengths are lost in single precision, those of
@@ -39,7 +40,7 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<
     };
     let meshes = scene.meshes.par_iter_mut().zip(deforming);
     let notes: Vec<Notes> =
-        meshes.map(|(mesh, deformation)| repair(mesh, &materials[mesh.material], deformation)).collect();
+        meshes.map(|(mesh, deformation)| repair(mesh, &all_variants(materials, mesh.material), deformation)).collect();
     for note in notes {
         scene.report.warnings.extend(note.warnings);
         scene.report.degenerate_triangles += note.degenerate;
@@ -96,17 +97,23 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
 
 /// Texture slots: transforms that are finite, and coordinates that are kept.
 fn texture_slots(scene: &mut Scene) {
-    for material in &mut scene.materials {
-        for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| !s.transform.is_finite()) {
-            slot.transform = glam::Affine2::IDENTITY;
-        }
-        // two sets of texture coordinates are kept; slots that use others get the first
-        for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| s.texcoord > 1) {
-            let set = std::mem::take(&mut slot.texcoord);
-            scene
-                .report
-                .warnings
-                .push(format!("texture coordinate set {set} is not supported (0 and 1 are): set 0 is used"));
+    let mut is_used = vec![false; scene.materials.len()];
+    for mesh in &scene.meshes {
+        is_used[mesh.material] = true;
+        let variants = scene.materials[mesh.material].variants.iter();
+        variants.flat_map(VariantMaterials::all).for_each(|i| is_used[i] = true);
+    }
+    for (material, is_used) in scene.materials.iter_mut().zip(is_used) {
+        for slot in material.texture_slots_mut().into_iter().flatten() {
+            if !slot.transform.is_finite() {
+                slot.transform = glam::Affine2::IDENTITY;
+            }
+            // two sets of texture coordinates are kept; slots that use others get the first
+            if slot.texcoord > 1 {
+                let set = std::mem::take(&mut slot.texcoord);
+                let text = "a material uses more than two sets of texture coordinates: its first in place of set";
+                scene.report.warnings.extend(is_used.then(|| format!("{text} {set}")));
+            }
         }
     }
 }
@@ -188,8 +195,9 @@ struct Notes {
     tangents: bool,
 }
 
-/// `deformation`: how the mesh deforms, if it does; the mesh is undeformed then.
-fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deformation>) -> Notes {
+/// `materials`: that of the mesh, and what it is in variants of the scene. `deformation`: how the
+/// mesh deforms, if it does; the mesh is undeformed then.
+fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Deformation>) -> Notes {
     let mut notes = Notes::default();
     let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };
 
@@ -205,7 +213,7 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
     let mut warn = |text: String| notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
 
     // texture coordinates and colours
-    for slot in material.textures() {
+    for slot in materials.iter().flat_map(|m| m.textures()) {
         let set = &mut triangles.texcoords[slot.texcoord];
         if set.is_empty() {
             warn(format!("has no texture coordinates {}, which its material uses: taken as zero", slot.texcoord));
@@ -228,9 +236,12 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
             notes.warnings.push(format!("mesh `{}`: {repaired} normals had no direction: computed", mesh.name));
         }
     }
-    if !material.needs_tangents() {
+    let with_tangents = materials.iter().find(|m| m.needs_tangents());
+    let Some(material) = with_tangents else {
         triangles.tangents = Vec::new();
-    } else if !tangents::normalize(triangles) {
+        return notes;
+    };
+    if !tangents::normalize(triangles) {
         if material.anisotropy.strength > 0.0 && !triangles.texcoords.iter().any(|set| tangents::varies(set)) {
             let text = "is anisotropic and has neither tangents nor texture coordinates: stretched around its y axis";
             notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));

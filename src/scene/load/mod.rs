@@ -60,6 +60,10 @@ pub fn load(source: &str) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let is_gltf = matches!(extension(Path::new(source)).as_str(), "gltf" | "glb");
+    if let Some(scene) = options.scene.filter(|_| !is_gltf) {
+        return Err(Error::Usage(format!("--gltf-scene {scene}: {source} is no glTF file, which may have several")));
+    }
     if let Some(name) = source.strip_prefix("builtin:") {
         return builtin::by_name(name)
             .ok_or_else(|| Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them")));
@@ -113,6 +117,9 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut scene = outcome?;
     scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if let Some(chosen) = options.scene {
+        scene.name = format!("{}, scene {chosen}", scene.name);
+    }
     finish::finish(&mut scene, path, &budget)?;
     scene.report.warnings = warnings::bounded(std::mem::take(&mut scene.report.warnings));
     Ok(scene)

@@ -16,6 +16,9 @@ pub struct LoadOptions<'a> {
     /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are
     /// not opened.
     pub confine: Confine<'a>,
+    /// Scene of a glTF file, by its name or, where none is called that, its number; `None`: the one
+    /// that the file names, or else its first.
+    pub scene: Option<&'a str>,
 }
 
 /// Images decoded so far.
@@ -29,7 +32,7 @@ pub struct ImagesDecoded {
 
 impl Default for LoadOptions<'_> {
     fn default() -> Self {
-        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere }
+        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere, scene: None }
     }
 }
 

@@ -24,6 +24,7 @@ const REFRACTION: Range = (1.0, f32::MAX);
 /// The numbers of a material: what they are called, their range, and where they are.
 #[rustfmt::skip]
 fn numbers(m: &mut Material) -> Vec<(&'static str, Range, &mut [f32])> {
+    // what every material has
     let single = std::slice::from_mut::<f32>;
     let [r, g, b, alpha] = m.base_color.as_mut();
     let mut all: Vec<(&'static str, Range, &mut [f32])> = vec![
@@ -51,8 +52,14 @@ fn numbers(m: &mut Material) -> Vec<(&'static str, Range, &mut [f32])> {
         ("a specular colour factor", AMOUNT, m.specular.color.as_mut()),
         ("an anisotropy", SHARE, single(&mut m.anisotropy.strength)),
         ("an anisotropy rotation", ANY, single(&mut m.anisotropy.rotation)),
+        ("an iridescence", SHARE, single(&mut m.iridescence.factor)),
+        ("an index of refraction of a thin film", REFRACTION, single(&mut m.iridescence.ior)),
+        ("a thickness of a thin film", AMOUNT, m.iridescence.thickness.as_mut_slice()),
+        ("a diffuse transmission", SHARE, single(&mut m.diffuse_transmission.factor)),
+        ("a colour of diffuse transmission", SHARE, m.diffuse_transmission.color.as_mut()),
     ];
-    // 0 is glTF's word for a Fresnel term of 1
+
+    // what has a range of its own, or is not always there; 0 is glTF's word for a Fresnel term of 1
     if m.ior != 0.0 || m.kind != MaterialKind::MetallicRoughness {
         all.push(("an index of refraction", REFRACTION, single(&mut m.ior)));
     }

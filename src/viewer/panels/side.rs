@@ -4,6 +4,7 @@ use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
 
 use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
+use crate::scene::settings::variant_index;
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Arrangement, Second};
@@ -26,7 +27,10 @@ pub fn show(app: &mut App, ui: &mut Ui) {
         );
     });
     section(ui, "Scene file", false, |ui| {
-        editor::edit(ui, app.settings.scene.editable(), &serde_json::json!({ "mtl_dissolve": "alpha" }));
+        let settings = app.settings.scene.editable().into_iter().filter(|s| s.name != "variant").collect();
+        editor::edit(ui, settings, &serde_json::json!({ "mtl_dissolve": "alpha" }));
+        variant(app, ui);
+        scene_of_file(app, ui);
     });
     section(ui, "Light", false, |ui| light(app, ui));
     section(ui, "Camera", false, |ui| camera(app, ui));
@@ -400,6 +404,56 @@ fn camera(app: &mut App, ui: &mut Ui) {
             }
             Err(e) => app.report(e.to_string(), true),
         }
+    }
+}
+
+/// The variants of the scene's materials, if it has some.
+fn variant(app: &mut App, ui: &mut Ui) {
+    let Some(names) = app.scene.as_ref().map(|s| s.variants.as_slice()).filter(|names| !names.is_empty()) else {
+        return;
+    };
+    let chosen = &mut app.settings.scene.variant;
+    let current = chosen.as_deref().and_then(|text| variant_index(names, text));
+    let shown = current.map_or("none", |k| names[k].as_str());
+    ui.horizontal(|ui| {
+        let heading = ui.label("Variant");
+        let combo = ComboBox::from_id_salt("variant").selected_text(shown);
+        let response = combo.show_ui(ui, |ui| {
+            if ui.selectable_label(current.is_none(), "none").clicked() {
+                *chosen = None;
+            }
+            for (k, name) in names.iter().enumerate() {
+                if ui.selectable_label(current == Some(k), name).clicked() {
+                    *chosen = Some(name.clone());
+                }
+            }
+        });
+        response.response.labelled_by(heading.id);
+    });
+}
+
+/// The scenes of a glTF file, if it has several.
+fn scene_of_file(app: &mut App, ui: &mut Ui) {
+    let Some(names) = app.scene.as_ref().map(|s| s.scenes.clone()).filter(|names| names.len() > 1) else { return };
+    let shown = app.gltf_scene.clone().unwrap_or_else(|| "the file's choice".to_owned());
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        let heading = ui.label("Scene");
+        let combo = ComboBox::from_id_salt("scene of the file").selected_text(shown);
+        let response = combo.show_ui(ui, |ui| {
+            for (k, name) in names.iter().enumerate() {
+                let number = k.to_string();
+                let is_chosen = app.gltf_scene.as_ref().is_some_and(|s| s == name || *s == number);
+                if ui.selectable_label(is_chosen, format!("{number} {name}")).clicked() {
+                    chosen = Some(number);
+                }
+            }
+        });
+        response.response.labelled_by(heading.id);
+    });
+    if chosen.is_some() {
+        app.gltf_scene = chosen;
+        app.reload();
     }
 }
 

@@ -32,13 +32,15 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Starts to load a file or `builtin:NAME`; `confine`: where the files lie that it may refer
-    /// to. Progress is sent as events; `mailbox` is woken for every part.
+    /// Starts to load a file or `builtin:NAME`. `gltf_scene`: which of the file's scenes;
+    /// `confine`: where the files lie that it may refer to. Progress is sent as events; `mailbox`
+    /// is woken for every part.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] when there can be no further thread.
     pub fn start(
         source: &str,
+        gltf_scene: Option<&str>,
         confine: Confine<'static>,
         mailbox: &Arc<Mailbox>,
         events: &EventSender,
@@ -47,6 +49,7 @@ impl Loader {
         let [is_ready, is_cancelled] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let job = Job {
             source: source.to_owned(),
+            gltf_scene: gltf_scene.map(str::to_owned),
             confine,
             parts: sender,
             wake: Wake { mailbox: mailbox.clone(), is_ready: is_ready.clone() },
@@ -101,6 +104,7 @@ impl Drop for Loader {
 
 struct Job {
     source: String,
+    gltf_scene: Option<String>,
     confine: Confine<'static>,
     parts: SyncSender<Result<Loaded>>,
     is_cancelled: Arc<AtomicBool>,
@@ -131,7 +135,10 @@ impl Job {
                 self.events.send(Event::Loading(format!("loading {name}: {}{total} images", images.done), share));
             }
         };
-        load::load_with(&self.source, &LoadOptions { textures, progress: &progress, confine: self.confine })
+        load::load_with(
+            &self.source,
+            &LoadOptions { textures, progress: &progress, confine: self.confine, scene: self.gltf_scene.as_deref() },
+        )
     }
 
     fn send(&self, part: Result<Loaded>) {

@@ -25,7 +25,7 @@ use crate::renderer::interactive::View;
 use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
 use crate::scene::load::Confine;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Scene, SceneSettings};
 use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
 
@@ -169,7 +169,8 @@ impl Worker {
         request: &Request,
         device: Option<Arc<Device>>,
     ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
-        let mut loader = Loader::start(source, self.confine, &self.mailbox, &self.events)?;
+        let mut loader =
+            Loader::start(source, request.gltf_scene.as_deref(), self.confine, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),
             None => Device::open(&request.device.options()),
@@ -287,7 +288,12 @@ impl Worker {
         let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
 
-        open.renderer.apply_scene_settings(&first.meaning);
+        // a variant that the scene before had may not exist in this one
+        if let Err(e) = open.renderer.apply_scene_settings(&first.meaning) {
+            let without = SceneSettings { variant: None, ..first.meaning.clone() };
+            open.renderer.apply_scene_settings(&without)?;
+            events.send(Event::Warning(e.to_string()));
+        }
         // the light may be a file that cannot be read: then there is the one before
         let (mut first, mut refused) = (first.clone(), None);
         let interactive = match open.renderer.interactive(&first.lighting, animation) {
@@ -674,6 +680,8 @@ fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
         bounds: scene.bounds().unwrap_or_default(),
         cameras: scene.cameras.clone(),
         animations: animations.iter().enumerate().map(|(k, a)| (name(k, &a.name), a.duration)).collect(),
+        scenes: scene.report.scenes.clone(),
+        variants: scene.variants.clone(),
         textures: scene.textures.iter().enumerate().map(|(k, t)| name(k, &t.name)).collect(),
         primitives: scene.triangle_count() + scene.sphere_count(),
         counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],

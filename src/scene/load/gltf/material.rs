@@ -12,7 +12,10 @@ use serde_json::{Map, Value};
 
 use super::glossiness::{RoughnessTexture, SpecularGlossiness};
 use super::values::{text, valid};
-use crate::scene::material::{AlphaMode, Anisotropy, Clearcoat, Material, Sheen, Specular, TextureSlot, Transmission};
+use crate::scene::material::{
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Material, Sheen, Specular, TextureSlot,
+    Transmission,
+};
 
 /// The extensions that the crate does not model; their names come with them.
 pub(super) trait UnmodelledExtension: Default + for<'a> Deserialize<'a> {
@@ -64,6 +67,34 @@ struct AnisotropyJson {
 
 impl UnmodelledExtension for AnisotropyJson {
     const NAME: &str = "KHR_materials_anisotropy";
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct IridescenceJson {
+    iridescence_factor: f32,
+    iridescence_texture: Option<Info>,
+    iridescence_ior: Option<f32>,
+    iridescence_thickness_minimum: Option<f32>,
+    iridescence_thickness_maximum: Option<f32>,
+    iridescence_thickness_texture: Option<Info>,
+}
+
+impl UnmodelledExtension for IridescenceJson {
+    const NAME: &str = "KHR_materials_iridescence";
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct DiffuseTransmissionJson {
+    diffuse_transmission_factor: f32,
+    diffuse_transmission_texture: Option<Info>,
+    diffuse_transmission_color_factor: Option<[f32; 3]>,
+    diffuse_transmission_color_texture: Option<Info>,
+}
+
+impl UnmodelledExtension for DiffuseTransmissionJson {
+    const NAME: &str = "KHR_materials_diffuse_transmission";
 }
 
 /// The crate models it on textures of its type `Info` only, which those for normals and occlusion
@@ -157,6 +188,8 @@ pub(super) fn convert(
             color_texture: slot(&s.specular_color_texture),
         }),
         anisotropy: AnisotropyJson::from_extensions(others)?.to_scene(),
+        iridescence: IridescenceJson::from_extensions(others)?.to_scene(),
+        diffuse_transmission: DiffuseTransmissionJson::from_extensions(others)?.to_scene(),
         parameters: parameters(material),
         ..Material::default()
     };
@@ -234,6 +267,34 @@ impl SheenJson {
             color_texture: slot(&self.sheen_color_texture),
             roughness: self.sheen_roughness_factor,
             roughness_texture: slot(&self.sheen_roughness_texture),
+        }
+    }
+}
+
+impl IridescenceJson {
+    fn to_scene(&self) -> Iridescence {
+        let default = Iridescence::default();
+        let [least, most] = default.thickness;
+        Iridescence {
+            factor: self.iridescence_factor,
+            texture: slot(&self.iridescence_texture),
+            ior: self.iridescence_ior.unwrap_or(default.ior),
+            thickness: [
+                self.iridescence_thickness_minimum.unwrap_or(least),
+                self.iridescence_thickness_maximum.unwrap_or(most),
+            ],
+            thickness_texture: slot(&self.iridescence_thickness_texture),
+        }
+    }
+}
+
+impl DiffuseTransmissionJson {
+    fn to_scene(&self) -> DiffuseTransmission {
+        DiffuseTransmission {
+            factor: self.diffuse_transmission_factor,
+            texture: slot(&self.diffuse_transmission_texture),
+            color: self.diffuse_transmission_color_factor.map_or(Vec3::ONE, Vec3::from),
+            color_texture: slot(&self.diffuse_transmission_color_texture),
         }
     }
 }

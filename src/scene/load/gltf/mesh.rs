@@ -11,7 +11,7 @@ use super::values::{AccessorIndex, valid};
 use crate::scene::TriangleMesh;
 
 /// Reads a primitive; `None` for points and lines, which have no surface. `tangents` says whether
-/// the material needs them.
+/// the material needs them, `sets` which sets of texture coordinates are kept.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -19,6 +19,7 @@ pub(super) fn read(
     reader: &Reader,
     primitive: &Primitive,
     tangents: bool,
+    sets: [u32; 2],
     warn: &mut dyn FnMut(String),
 ) -> Result<Option<TriangleMesh>, String> {
     let mode = match valid(primitive.mode) {
@@ -67,7 +68,7 @@ pub(super) fn read(
     if let Some(a) = attribute(Semantic::Tangents).filter(|_| tangents && !mesh.normals.is_empty()) {
         mesh.tangents = reader.floats(same_count(a)?, Type::Vec4, Vec4::from_array)?;
     }
-    for (set, texcoords) in (0..).zip(&mut mesh.texcoords) {
+    for (set, texcoords) in sets.into_iter().zip(&mut mesh.texcoords) {
         if let Some(a) = attribute(Semantic::TexCoords(set)) {
             *texcoords = reader.floats(same_count(a)?, Type::Vec2, Vec2::from_array)?;
         }

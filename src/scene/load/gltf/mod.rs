@@ -24,8 +24,10 @@ mod skin;
 mod texture;
 mod uri;
 mod values;
+mod variants;
+mod xmp;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 
 use ::gltf::json::Root;
@@ -39,7 +41,8 @@ use values::text;
 use super::compact;
 use super::options::Loading;
 use crate::error::{Error, Result};
-use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
+use crate::scene::material::{VariantMaterials, all_variants};
+use crate::scene::{FileExtension, Geometry, Instance, Material, Mesh, Scene};
 
 /// Extensions that skylit reads, and whether this program was built with what they need.
 const KNOWN: &[(&str, bool)] = &[
@@ -50,19 +53,23 @@ const KNOWN: &[(&str, bool)] = &[
     ("KHR_lights_punctual", true),
     ("KHR_materials_anisotropy", true),
     ("KHR_materials_clearcoat", true),
+    ("KHR_materials_diffuse_transmission", true),
     ("KHR_materials_emissive_strength", true),
     ("KHR_materials_ior", true),
+    ("KHR_materials_iridescence", true),
     ("KHR_materials_pbrSpecularGlossiness", true),
     ("KHR_materials_sheen", true),
     ("KHR_materials_specular", true),
     ("KHR_materials_transmission", true),
     ("KHR_materials_unlit", true),
+    ("KHR_materials_variants", true),
     ("KHR_materials_volume", true),
     ("KHR_mesh_quantization", true),
     ("KHR_meshopt_compression", cfg!(feature = "meshopt")),
     ("KHR_node_visibility", true),
     ("KHR_texture_basisu", cfg!(feature = "ktx2")),
     ("KHR_texture_transform", true),
+    ("KHR_xmp_json_ld", true),
 ];
 
 /// Reads a `.gltf` or `.glb` file.
@@ -80,7 +87,11 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let stored = Reader { document: &document, buffers: &buffers, decoded: &Decoded::default(), budget };
     let decoded = compressed::decode(&stored);
     let reader = Reader { decoded: &decoded, ..stored };
-    let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
+    let input = |e| Error::input(path, e);
+    let chosen = node::choose_scene(&document, loading.options.scene).map_err(input)?;
+    scene.report.metadata = xmp::read(&document, &doubles.asset);
+    scene.report.scenes = document.scenes.iter().map(|s| text(&s.name).to_owned()).collect();
+    let placed = node::place(&document, &doubles, chosen, !doubles.skins.is_empty()).map_err(input)?;
 
     let mut warnings = Vec::new();
 
@@ -94,10 +105,18 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     (scene.textures, scene.report.skipped_images) =
         texture::resolve(&reader, path, &mut scene.materials, &made, loading, &mut |w| warnings.push(w));
 
+    scene.variants = variants::names(&document).map_err(input)?;
+
     // nodes, and what they carry
-    let input = |e| Error::input(path, e);
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
-    let mut meshes = Meshes { reader: &reader, path, primitives: BTreeMap::new(), default_material: None };
+    let mut meshes = Meshes {
+        reader: &reader,
+        path,
+        primitives: BTreeMap::new(),
+        default_material: None,
+        varied: Vec::new(),
+        with_sets: BTreeMap::new(),
+    };
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
         let name = text(&node.name);
@@ -179,6 +198,10 @@ struct Meshes<'a> {
     primitives: BTreeMap<MeshVariant, Vec<LoadedMesh>>,
     /// The scene's material for primitives without one.
     default_material: Option<usize>,
+    /// The scene's materials that depend on its variant.
+    varied: Vec<usize>,
+    /// Materials for other sets of texture coordinates than the first two.
+    with_sets: BTreeMap<(usize, [u32; 2]), usize>,
 }
 
 /// A mesh of the scene.
@@ -219,7 +242,8 @@ impl Meshes<'_> {
                     warnings.push(format!("{place} {w}"));
                 }
             };
-            let input = |e: String| Error::input(self.path, format!("{place}: {e}"));
+            let path = self.path;
+            let input = |e: String| Error::input(path, format!("{place}: {e}"));
             let material = match primitive.material.map(|m| m.value()) {
                 Some(m) if m < scene.materials.len() && m < self.reader.document.materials.len() => m,
                 Some(m) => return Err(input(format!("material {m} does not exist"))),
@@ -229,9 +253,19 @@ impl Meshes<'_> {
                 }),
             };
 
+            // what it is in variants of the scene
+            let known = self.reader.document.materials.len();
+            let variants = variants::materials(primitive, material, scene.variants.len(), known).map_err(input)?;
+            let mut variants = variants.unwrap_or(VariantMaterials { base: material, replacements: Vec::new() });
+            let sets = texcoord_sets(variants.all().map(|i| &scene.materials[i]));
+            variants.all_mut().for_each(|i| *i = self.with_sets(*i, sets, scene));
+            let material =
+                if variants.replacements.is_empty() { variants.base } else { self.varied_material(variants, scene) };
+
             // the primitive, with what deforms it
-            let tangents = scene.materials[material].needs_tangents();
-            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &mut warn).map_err(input)? else {
+            let tangents = all_variants(&scene.materials, material).iter().any(|m| m.needs_tangents());
+            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, sets, &mut warn).map_err(input)?
+            else {
                 continue;
             };
             let mut deformation = stage.deformation(wanted, primitive, &triangles, at, &mut warn).map_err(input)?;
@@ -246,6 +280,50 @@ impl Meshes<'_> {
         }
         self.primitives.insert(wanted.clone(), made.clone());
         Ok(made)
+    }
+
+    /// Index of a material whose slots count these sets of texture coordinates as the first two.
+    fn with_sets(&mut self, material: usize, sets: [u32; 2], scene: &mut Scene) -> usize {
+        if sets == [0, 1] {
+            return material;
+        }
+        *self.with_sets.entry((material, sets)).or_insert_with(|| {
+            let mut renumbered = scene.materials[material].clone();
+            for slot in renumbered.texture_slots_mut().into_iter().flatten() {
+                // a third set stays what it is, and is refused
+                let place = sets.iter().position(|set| *set as usize == slot.texcoord);
+                slot.texcoord = place.unwrap_or(slot.texcoord);
+            }
+            scene.materials.push(renumbered);
+            scene.materials.len() - 1
+        })
+    }
+
+    /// Index of the scene's material that is one of these at a time: one for all primitives that
+    /// have the same.
+    fn varied_material(&mut self, variants: VariantMaterials, scene: &mut Scene) -> usize {
+        let same = |i: &&usize| scene.materials[**i].variants.as_ref() == Some(&variants);
+        if let Some(known) = self.varied.iter().find(same) {
+            return *known;
+        }
+        let base = scene.materials[variants.base].clone();
+        self.varied.push(scene.materials.len());
+        scene.materials.push(Material { variants: Some(variants), ..base });
+        scene.materials.len() - 1
+    }
+}
+
+/// The two sets of texture coordinates that a primitive keeps: the first two that its materials
+/// use.
+fn texcoord_sets<'a>(materials: impl Iterator<Item = &'a Material>) -> [u32; 2] {
+    let used: BTreeSet<u32> = materials.flat_map(Material::textures).map(|slot| slot.texcoord as u32).collect();
+    let mut used = used.into_iter();
+    match [used.next(), used.next()] {
+        [None | Some(0 | 1), None | Some(0 | 1)] => [0, 1],
+        [first, second] => {
+            let first = first.unwrap_or(0);
+            [first, second.unwrap_or(first + 1)]
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use ::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use ::gltf::json::{Index, Node, Root};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::values::{text, valid};
 use crate::scene::animation::LocalTransform;
@@ -21,8 +22,17 @@ pub(super) struct Doubles {
     cameras: Vec<CameraJson>,
     /// Read by us because the crate refuses channels without a node (KHR_animation_pointer).
     pub animations: Vec<super::animation::Animation>,
+    /// Extensions of the asset, which the crate leaves out.
+    pub asset: Asset,
     /// For the same reason: what the crate refuses is read again without them.
     pub skins: Vec<super::skin::Skin>,
+}
+
+/// The part of a document that describes it.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Asset {
+    pub extensions: Value,
 }
 
 #[derive(Deserialize)]
@@ -70,13 +80,40 @@ pub(super) struct PlacedNode {
     pub visible: bool,
 }
 
-/// Every node of the scene with its world transform, parents before children, in the order of the
-/// file. With `all` the nodes outside of the scene follow, whose transforms the joints of skins may
-/// want.
+/// Index of the scene that is loaded; `None` in a file without scenes. `wanted`: its name or, where
+/// none is called that, its number.
+///
+/// # Errors
+/// What is wrong, in words.
+pub(super) fn choose_scene(document: &Root, wanted: Option<&str>) -> Result<Option<usize>, String> {
+    let scenes = &document.scenes;
+    let Some(wanted) = wanted else {
+        return match document.scene.map(|s| s.value()) {
+            Some(s) if s >= scenes.len() && !scenes.is_empty() => Err(format!("the default scene {s} does not exist")),
+            s => Ok((!scenes.is_empty()).then(|| s.unwrap_or(0))),
+        };
+    };
+    let number = || wanted.parse().ok().filter(|n| *n < scenes.len());
+    let found = scenes.iter().position(|s| text(&s.name) == wanted).or_else(number);
+    found.map(Some).ok_or_else(|| {
+        let name = |(k, s): (usize, &::gltf::json::Scene)| format!("{k} `{}`", text(&s.name));
+        let all = scenes.iter().enumerate().map(name).collect::<Vec<_>>().join(", ");
+        format!("--gltf-scene {wanted}: no such scene, but {}", if all.is_empty() { "none has a name" } else { &all })
+    })
+}
+
+/// Every node of a scene with its world transform, parents before children, in the order of the
+/// file; of everything without one. With `all` the nodes outside of the scene follow, whose
+/// transforms the joints of skins may want.
 ///
 /// # Errors
 /// What is wrong, in words: indices out of range, nodes reached twice.
-pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec<PlacedNode>, String> {
+pub(super) fn place(
+    document: &Root,
+    doubles: &Doubles,
+    scene: Option<usize>,
+    all: bool,
+) -> Result<Vec<PlacedNode>, String> {
     let nodes = &document.nodes;
     let mut parents = vec![0u32; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
@@ -94,11 +131,9 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
     }
 
     // roots of the scene, or of everything where there is none
-    let no_scene = document.scenes.is_empty();
-    let roots: Vec<usize> = match document.scene.map(|s| s.value()) {
-        Some(s) if s >= document.scenes.len() => return Err(format!("the default scene {s} does not exist")),
-        _ if no_scene => (0..nodes.len()).filter(|&i| parents[i] == 0).collect(),
-        s => document.scenes[s.unwrap_or(0)].nodes.iter().map(Index::value).collect(),
+    let roots: Vec<usize> = match scene {
+        Some(scene) => document.scenes[scene].nodes.iter().map(Index::value).collect(),
+        None => (0..nodes.len()).filter(|&i| parents[i] == 0).collect(),
     };
 
     // nodes from their roots down
@@ -134,7 +169,9 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
     }
 
     // without a scene a circle has no root, so that no node of it was placed
-    if no_scene && let Some(i) = seen.iter().position(|s| !s) {
+    if scene.is_none()
+        && let Some(i) = seen.iter().position(|s| !s)
+    {
         return Err(format!("node {i} is its own ancestor"));
     }
     Ok(placed)

@@ -14,6 +14,9 @@ use crate::scene::load::text::{self, unquoted, without_comment};
 use crate::scene::material::{AlphaMode, Material, MaterialKind};
 use crate::scene::settings::MtlDissolve;
 
+/// Roughness of fibres: MTL has a number for how much sheen there is, and none for this.
+const SHEEN_ROUGHNESS: f32 = 0.5;
+
 /// Material of faces without a (known) one: matte, a little darker than white.
 pub(super) fn grey(name: String) -> Material {
     Material { name, base_color: Vec4::new(0.8, 0.8, 0.8, 1.0), ..Material::default() }
@@ -113,6 +116,7 @@ impl<'a> MaterialLibrary<'a> {
             parameters: m.parameters.clone(),
             ..Material::default()
         };
+        layers(&mut out);
 
         // textures; a factor is often left black where a map says it all
         out.base_color_texture = self.textures.color(m.map_diffuse.as_ref(), m.map_dissolve.as_ref(), beside, scene);
@@ -198,6 +202,23 @@ impl<'a> MaterialLibrary<'a> {
             out.metallic = 1.0;
         }
     }
+}
+
+/// Clearcoat, sheen and anisotropy, by the names that programs have agreed on: `Pc`, `Pcr`, `Ps`,
+/// `aniso` and `anisor`, a share of a turn.
+fn layers(out: &mut Material) {
+    let share = |name: &str| out.parameters.get(name).map(|value| value.clamp(0.0, 1.0));
+    let (clearcoat, clearcoat_roughness) = (share("Pc"), share("Pcr"));
+    let (sheen, anisotropy) = (share("Ps"), share("aniso"));
+    let turn = out.parameters.get("anisor").copied();
+    out.clearcoat.factor = clearcoat.unwrap_or(0.0);
+    out.clearcoat.roughness = clearcoat_roughness.unwrap_or(0.0);
+    if let Some(sheen) = sheen.filter(|s| *s > 0.0) {
+        out.sheen.color = Vec3::splat(sheen);
+        out.sheen.roughness = SHEEN_ROUGHNESS;
+    }
+    out.anisotropy.strength = anisotropy.unwrap_or(0.0);
+    out.anisotropy.rotation = turn.map_or(0.0, |turn| turn * std::f32::consts::TAU);
 }
 
 /// How opaque a material is: `d`, or 1 - `Tr`.
