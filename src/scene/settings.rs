@@ -35,7 +35,7 @@ settings! {
         /// What `d` below 1 means in an .mtl file without anything else that says glass [default: alpha]
         mtl_dissolve: Option<MtlDissolve>, option(value_enum), applies(AppliesTo::ALL);
         /// Variant of the materials, by its name or its number from 0, of files that have several [default: none]
-        variant: Option<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL), basic;
+        variant: Option<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
     }
 }
 

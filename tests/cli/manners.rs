@@ -126,7 +126,7 @@ fn bash_completes_options_values_and_scenes() {
     assert_eq!(complete("skylit ren"), ["render"]);
     assert_eq!(complete("skylit render x.glb --integrator di"), ["direct"]);
     assert_eq!(complete("skylit render x.glb --tone-map ag"), ["agx"]);
-    assert_eq!(complete("skylit render x.glb --ao-ra"), ["--ao-radius"]);
+    assert_eq!(complete("skylit render x.glb --ao-radi"), ["--ao-radius"]);
     assert_eq!(complete("skylit render x.glb --trav"), ["--traversal"]);
     assert_eq!(complete("skylit render builtin : at"), ["atrium"]);
     // quoted, it is one word

@@ -625,6 +625,50 @@ fn another_scene_starts_afresh() {
     assert!(request.lighting.light.is_empty() && request.lighting.environment.is_some());
 }
 
+/// Variants and scenes of a glTF file are lists in the panel; neither is kept for a file that has none of that name.
+#[test]
+fn variants_and_scenes_of_a_file_are_chosen() {
+    let mut alone = alone(Some("shoe.glb"));
+    let summary = |load: u64, source: &str, names: [&str; 2]| SceneSummary {
+        load,
+        is_complete: true,
+        source: source.into(),
+        scenes: names.map(str::to_owned).to_vec(),
+        variants: names.map(str::to_owned).to_vec(),
+        ..Default::default()
+    };
+    alone.events.send(Event::Loaded(Box::new(summary(1, "shoe.glb", ["beach", "street"]))));
+    alone.harness.run_steps(3);
+    alone.harness.get_all_by_label("Scene file").last().unwrap().click();
+    alone.harness.run_steps(10);
+
+    // a variant is a setting, and needs no loading
+    let choose = |alone: &mut Alone, list: &str, item: &str| {
+        alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, list).click();
+        alone.harness.run_steps(5);
+        alone.harness.get_all_by_label(item).last().unwrap().click();
+        alone.harness.run_steps(5);
+    };
+    choose(&mut alone, "Variant", "street");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.meaning.variant.as_deref(), request.load), (Some("street"), 1));
+
+    // another scene of the file does
+    choose(&mut alone, "Scene", "1 street");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.gltf_scene.as_deref(), request.load), (Some("1"), 2));
+    alone.events.send(Event::Loaded(Box::new(summary(2, "shoe.glb", ["beach", "street"]))));
+    alone.harness.run_steps(3);
+    assert_eq!(alone.mailbox.peek().meaning.variant.as_deref(), Some("street"));
+
+    // another file has neither
+    alone.change(|app| app.open("lamp.glb"));
+    alone.events.send(Event::Loaded(Box::new(summary(3, "lamp.glb", ["on", "off"]))));
+    alone.harness.run_steps(3);
+    let request = alone.mailbox.peek();
+    assert_eq!((request.gltf_scene, request.meaning.variant), (None, None));
+}
+
 /// Play at the end starts anew; Space shows one image of two.
 #[test]
 fn play_and_flicker_have_an_effect() {
