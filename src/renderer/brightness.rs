@@ -12,7 +12,7 @@ const MIDDLE_GREY: f64 = 0.18;
 /// Exposures of fewer stops are not chosen: such an image shows what it has.
 const FAR: f64 = 3.0;
 /// Values count as this share of the mean at least.
-const DARK: f64 = 1e-3;
+const DARK: f64 = 1e-2;
 /// Luminance of linear sRGB.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
@@ -44,7 +44,8 @@ pub fn exposure(image: &Accumulated) -> Option<f64> {
     // what light hardly reaches must not decide
     let logarithms = values.iter().map(|v| v.max(DARK * mean).ln()).sum::<f64>();
     let average = (logarithms / values.len() as f64).exp();
-    Some((MIDDLE_GREY / average).log2().round()).filter(|stops| stops.abs() >= FAR)
+    let stops = (MIDDLE_GREY / average).log2();
+    (stops.abs() >= FAR).then(|| stops.round())
 }
 
 /// A warning about an image of this mean, with a remedy; `None` if it is fine. `exposure` in stops.
@@ -109,7 +110,7 @@ mod tests {
         };
         assert_eq!(image(&[(0.18, 1.0), (0.36, 1.0)]), None);
         // the average of logarithms, of surfaces alone
-        assert_eq!(image(&[(180.0, 1.0), (0.18, 1.0), (1e9, 0.5)]), Some(-5.0));
+        assert_eq!(image(&[(180.0, 1.0), (1.8, 1.0), (1e9, 0.5)]), Some(-7.0));
         assert_eq!(image(&[(0.18 / 16.0, 1.0)]), Some(4.0));
         assert_eq!(image(&[(0.18 / 6.0, 1.0)]), None);
         // one pixel without light changes little, and none has no exposure
