@@ -9,6 +9,7 @@ use crate::settings::{AppliesTo, Capability, Length, settings};
 const AO: AppliesTo = AppliesTo::all_of(Capability::AmbientOcclusion);
 
 /// Maximum number of occlusion rays per camera ray.
+#[cfg(feature = "cli")]
 const MAX_RAYS: u32 = 16;
 
 settings! {
