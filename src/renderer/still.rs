@@ -372,8 +372,9 @@ impl<'a> StillRender<'a> {
 
         // warnings, of which those about brightness can be switched off
         let surface_mean = brightness::surface_mean(image, integrator.channels().len());
-        let exposure = f64::from(self.picture_options(image).exposure);
-        let chosen_exposure = self.chosen_exposure(image).map(|stops| {
+        let chosen_exposure = self.chosen_exposure(image);
+        let exposure = chosen_exposure.unwrap_or_else(|| settings.picture.options().exposure.into());
+        let chosen_exposure = chosen_exposure.map(|stops| {
             format!("exposure of pictures: {stops:+} stops, for the light of the scene is far from a display's (--exposure {stops}); --exposure 0 shows it as it is")
         });
         let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));

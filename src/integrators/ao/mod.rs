@@ -252,7 +252,7 @@ pub fn render(
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
-        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.ilog2())?,
+        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.max(1).ilog2())?,
         has_entry_points: false,
         resolve: shaders::RESOLVE.pipeline(device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
