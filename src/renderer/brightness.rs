@@ -13,6 +13,8 @@ const MIDDLE_GREY: f64 = 0.18;
 const FAR: f64 = 3.0;
 /// Values count as this share of the mean at least.
 const DARK: f64 = 1e-2;
+/// Where the logarithms ask for more light, this share of the surfaces stays below white.
+const KEPT: f64 = 0.95;
 /// Luminance of linear sRGB.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
@@ -27,15 +29,16 @@ pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
     (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
 }
 
-/// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms;
-/// `None` where that is near to what is shown anyway, and where no surface has light. Reinhard,
+/// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms, or at
+/// which the brightest twentieth becomes white if that is less; `None` where that is near to what is
+/// shown anyway, and where no surface has light. Reinhard,
 /// Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
 pub fn exposure(image: &Accumulated) -> Option<f64> {
     let film = &image.film;
     let planes = [0, 1, 2].map(|c| film.plane(c));
     let shown = film.coverage.iter().enumerate().filter(|(_, a)| **a >= COVERED);
     let luminance = |(i, _)| -> f64 { LUMINANCE.iter().zip(&planes).map(|(w, p)| w * f64::from(p[i])).sum() };
-    let values: Vec<f64> = shown.map(luminance).collect();
+    let mut values: Vec<f64> = shown.map(luminance).collect();
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     if mean <= 0.0 || !mean.is_finite() {
         return None;
@@ -44,7 +47,12 @@ pub fn exposure(image: &Accumulated) -> Option<f64> {
     // what light hardly reaches must not decide
     let logarithms = values.iter().map(|v| v.max(DARK * mean).ln()).sum::<f64>();
     let average = (logarithms / values.len() as f64).exp();
-    let stops = (MIDDLE_GREY / average).log2();
+    let grey = (MIDDLE_GREY / average).log2();
+
+    // of much darkness and some light, the light is what is looked at
+    let bright = (KEPT * (values.len() - 1) as f64) as usize;
+    let (_, bright, _) = values.select_nth_unstable_by(bright, f64::total_cmp);
+    let stops = if grey > 0.0 { grey.min((-bright.log2()).max(0.0)) } else { grey };
     (stops.abs() >= FAR).then(|| stops.round())
 }
 
@@ -115,6 +123,14 @@ mod tests {
         assert_eq!(image(&[(0.18 / 6.0, 1.0)]), None);
         // one pixel without light changes little, and none has no exposure
         assert_eq!(image(&[(0.0, 1.0), (18.0, 1.0), (18.0, 1.0), (18.0, 1.0)]), Some(-5.0));
+        // most of it dark, and a fifth lit: as bright as what is lit allows
+        let lit = |value: f32| {
+            let mut pixels = vec![(0.0, 1.0); 80];
+            pixels.extend([(value, 1.0); 20]);
+            image(&pixels)
+        };
+        assert_eq!(lit(0.5), None);
+        assert_eq!(lit(1.0 / 32.0), Some(5.0));
         assert_eq!(image(&[(0.0, 1.0)]), None);
         assert_eq!(image(&[]), None);
     }

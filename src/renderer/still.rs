@@ -373,11 +373,14 @@ impl<'a> StillRender<'a> {
         // warnings, of which those about brightness can be switched off
         let surface_mean = brightness::surface_mean(image, integrator.channels().len());
         let chosen_exposure = self.chosen_exposure(image);
-        let exposure = chosen_exposure.unwrap_or_else(|| settings.picture.options().exposure.into());
+        let exposure = f64::from(settings.picture.options().exposure);
         let chosen_exposure = chosen_exposure.map(|stops| {
             format!("exposure of pictures: {stops:+} stops, for the light of the scene is far from a display's (--exposure {stops}); --exposure 0 shows it as it is")
         });
-        let brightness = surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
+        // an exposure that was chosen for the image needs no other
+        let brightness = surface_mean
+            .filter(|_| chosen_exposure.is_none())
+            .and_then(|mean| brightness::warning(mean, integrator.capabilities(), exposure));
         details.warnings.iter().for_each(|w| control.warning(w));
         brightness.iter().for_each(|w| control.brightness(w));
         self.warnings.extend(details.warnings.iter().chain(&brightness).cloned());
