@@ -54,7 +54,7 @@ void closest(uint index, Hit hit) {
     if (WITH_SIGNAL) clear_signal(path, k);
     // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
-    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
+    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, false, scale, NO_MEDIUM);
     if (WITH_MEDIA) {
         state.medium = current_medium(path.camera_media);
         // clipping planes hide surfaces, not what the camera is in

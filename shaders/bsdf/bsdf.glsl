@@ -73,6 +73,7 @@ struct Bsdf {
     Clearcoat clearcoat;
     Sheen sheen;
     Film film;
+    float retroreflected;  // share of what the interface reflects that returns to where it came from
     LobeProbabilities probabilities;
     vec3 ng;           // geometric normal in the frame, on the viewer's side
 };
@@ -102,7 +103,7 @@ Bsdf black_bsdf() {
     b.kind = BSDF_NONE;
     b.diffuse = b.through = b.f0 = b.k = b.transmitted = vec3(0.0);
     b.tint = b.f90 = vec3(1.0);
-    b.dielectric_f0 = b.through_share = 0.0;
+    b.dielectric_f0 = b.through_share = b.retroreflected = 0.0;
     b.dielectric_f90 = b.dielectric_weight = b.eta = b.base_transmittance = 1.0;
     b.volume = false;
     b.facets = Microfacets(vec2(1.0), false);

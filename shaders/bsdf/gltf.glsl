@@ -4,6 +4,7 @@
 #define BSDF_GLTF_
 #include "bsdf/clearcoat.glsl"
 #include "bsdf/iridescence.glsl"
+#include "bsdf/retroreflection.glsl"
 #include "bsdf/sheen.glsl"
 
 bool has_transmission() { return HAS_THIN_WALLS || HAS_VOLUMES; }
@@ -138,6 +139,22 @@ bool gltf_has_rough_part(Bsdf b) {
     return !is_smooth(b.facets) && b.probabilities.interface_ > 0.0;
 }
 
+// Share of light that reaches what is diffuse, for an interface that is retroreflective in part; f: as it reflects to wo.
+float diffuse_share_at(Bsdf b, InterfaceFresnel f, vec3 wo, vec3 wi) {
+    if (!HAS_RETROREFLECTION || b.retroreflected == 0.0) return f.diffuse;
+    vec3 back = mirror_image(wo);
+    return mix(f.diffuse, interface_fresnel(b, dot(back, normalize(back + wi))).diffuse, b.retroreflected);
+}
+
+// What the interface reflects back to where it came from: what it would reflect to the mirror image of wo about the normal.
+BsdfValue retroreflected_at(Bsdf b, vec3 wo, vec3 wi) {
+    vec3 back = mirror_image(wo), m = normalize(back + wi);
+    InterfaceFresnel f = interface_fresnel(b, dot(back, m));
+    float d = distribution(b.facets, m) * masking_shadowing(b.facets, back, wi);
+    float reflects = b.probabilities.interface_ * reflected_probability(b, f);
+    return BsdfValue(f.reflected * (d / (4.0 * wo.z)), reflects * reflected_pdf(b.facets, back, m));
+}
+
 // The interface's own reflection and transmission, and what is diffuse below it.
 BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = NO_VALUE;
@@ -156,14 +173,21 @@ BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
     InterfaceFresnel f = interface_fresnel(b, om);
     if (up) {
         float cosine = wi.z / PI;
-        value = BsdfValue(b.diffuse * (f.diffuse * cosine), b.probabilities.diffuse * cosine);
+        value = BsdfValue(b.diffuse * (diffuse_share_at(b, f, wo, wi) * cosine), b.probabilities.diffuse * cosine);
     }
     if (is_smooth(b.facets)) return value;
     float d = distribution(b.facets, m) * masking_shadowing(b.facets, wo, vec3(wi.xy, abs(wi.z)));
     float reflects = b.probabilities.interface_ * reflected_probability(b, f), transmits = b.probabilities.interface_ - reflects;
     if (up) {
-        value.f += f.reflected * (d / (4.0 * wo.z));
-        value.pdf += reflects * reflected_pdf(b.facets, wo, m);
+        float share = 1.0;
+        if (HAS_RETROREFLECTION && b.retroreflected > 0.0) {
+            share -= b.retroreflected;
+            BsdfValue back = retroreflected_at(b, wo, wi);
+            value.f += back.f * b.retroreflected;
+            value.pdf += back.pdf * b.retroreflected;
+        }
+        value.f += f.reflected * (share * d / (4.0 * wo.z));
+        value.pdf += share * reflects * reflected_pdf(b.facets, wo, m);
     } else if (straight) {
         value.f += b.transmitted * (f.transmitted * d / (4.0 * wo.z));
         value.pdf += transmits * reflected_pdf(b.facets, wo, m);
@@ -200,7 +224,7 @@ BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
 
 vec3 gltf_diffuse(Bsdf b, vec3 wo, vec3 wi) {
     if (!(wi.z > 0.0)) return vec3(0.0);
-    float value = interface_fresnel(b, dot(wo, normalize(wo + wi))).diffuse * wi.z / PI;
+    float value = diffuse_share_at(b, interface_fresnel(b, dot(wo, normalize(wo + wi))), wo, wi) * wi.z / PI;
     if (HAS_SHEEN && b.sheen.kept < 1.0) value *= min(b.sheen.kept, sheen_kept(b.sheen, wi.z));
     value *= shadowing(b.ng, FRAME_NORMAL, wi);
     if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) value *= clearcoat_transmits(b.clearcoat, wo, wi);
@@ -226,9 +250,15 @@ BsdfSample interface_sample(Bsdf b, vec3 wo, vec2 u, float v, out bool found) {
     found = om > 0.0;
     if (v < probability) {
         found = found && s.wi.z > 0.0;
+        float share = 1.0;
+        if (HAS_RETROREFLECTION && b.retroreflected > 0.0) {
+            bool returns = v < probability * b.retroreflected;
+            share = returns ? b.retroreflected : 1.0 - b.retroreflected;
+            if (returns) s.wi = mirror_image(s.wi);
+        }
         if (smooth_surface) {
-            s.pdf = b.probabilities.interface_ * probability;
-            s.weight = f.reflected * layers_transmit(b, wo, s.wi) / s.pdf;
+            s.pdf = b.probabilities.interface_ * probability * share;
+            s.weight = f.reflected * (share * layers_transmit(b, wo, s.wi)) / s.pdf;
         }
         return s;
     }
@@ -332,6 +362,9 @@ void gltf_setup(inout Bsdf b, inout MaterialPoint point) {
         b.film.weight = SHADING_OF(m).iridescence * point.textures.at[USE_IRIDESCENCE].r;
         b.film.thickness = mix(thickness.x, thickness.y, point.textures.at[USE_IRIDESCENCE_THICKNESS].g);
         b.film.ior = SHADING_OF(m).iridescence_ior;
+    }
+    if (HAS_RETROREFLECTION && SHADING_OF(m).retroreflection > 0.0) {
+        b.retroreflected = SHADING_OF(m).retroreflection * point.textures.at[USE_RETROREFLECTION].r;
     }
     if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
         float r = SHADING_OF(m).sheen_roughness * point.textures.at[USE_SHEEN_ROUGHNESS].a;

@@ -4,6 +4,7 @@
 #ifndef PATH_MEDIA
 #define PATH_MEDIA
 #include "path/shading.glsl"
+#include "path/wavelength.glsl"
 
 // Materials of volumes, the last entered first; NO_MEDIUM at the end. Beyond four, the first that was entered is forgotten.
 #define MediaStack uvec4
@@ -37,15 +38,23 @@ MediaStack left(MediaStack stack, uint m) {
     return stack.w == m ? MediaStack(stack.xyz, NO_MEDIUM) : stack;
 }
 
-// Index of refraction; 1 outside of all volumes.
-float medium_ior(uint m) { return m == NO_MEDIUM ? 1.0 : SHADING_OF(m).ior; }
+// Index of refraction at a wavelength; 1 outside of all volumes.
+float medium_ior(uint m, float wavelength) {
+    if (m == NO_MEDIUM) return 1.0;
+    return HAS_DISPERSION ? index_at(m, wavelength) : SHADING_OF(m).ior;
+}
+
+// Index of refraction of one medium over that of another.
+float relative_ior(uint beyond, uint here, float wavelength) { return medium_ior(beyond, wavelength) / medium_ior(here, wavelength); }
+
+bool disperses(uint m) { return m != NO_MEDIUM && SHADING_OF(m).dispersion > 0.0; }
 
 // The medium beyond a surface of a volume.
 struct Boundary {
     bool is_there;
     uint medium;       // beyond
+    uint before;       // the medium before it: where a path leaves without having entered, that of the surface
     MediaStack stack;  // beyond
-    float eta;         // index of refraction beyond the surface over that before it
 };
 
 Boundary boundary_at(uint material, bool front, uint here, MediaStack stack) {
@@ -55,13 +64,20 @@ Boundary boundary_at(uint material, bool front, uint here, MediaStack stack) {
         // a path that leaves without having entered: the mesh is not closed, or the path began inside
         b.is_there = true;
         b.medium = here;
-        b.eta = medium_ior(here) / medium_ior(material);
+        b.before = material;
         return b;
     }
     b.medium = current_medium(b.stack);
     b.is_there = b.medium != here;
-    b.eta = medium_ior(b.medium) / medium_ior(here);
+    b.before = here;
     return b;
+}
+
+// How the boundary disperses a path whose wavelength has a place among all; is_single: it has no other already.
+Dispersion dispersion_at(Boundary b, float place, bool is_single) {
+    if (!disperses(b.medium) && !disperses(b.before)) return NO_DISPERSION;
+    vec2 etas = vec2(relative_ior(b.medium, b.before, WAVELENGTHS.x), relative_ior(b.medium, b.before, WAVELENGTHS.y));
+    return Dispersion(true, is_single ? vec3(1.0) : color_of_wavelength(place), etas);
 }
 
 MediaStack load_media(PathParams p, uint k) { return LOAD_QUAD(p.media, k); }

@@ -24,6 +24,7 @@ struct PathState {
     uint index;      // of its camera ray
     uint depth;      // bounces so far
     uint passes;     // surfaces that it went straight through: they are no bounces
+    bool is_single;  // it has one wavelength (path/wavelength.glsl)
     float eta_scale; // product of squared relative indices of refraction, by which Russian roulette scales throughput
     uint medium;     // material of the volume that it is in, or NO_MEDIUM
 };
@@ -36,13 +37,13 @@ PathState load_state(PathParams p, uint k) {
     uvec4 a = LOAD_QUAD(p.states, 2u * k);
     uvec2 b = LOAD_PAIR(p.states, 4u * k + 2u), c = uvec2(floatBitsToUint(WITH_CONSTANT_ALBEDO ? p.albedo : 1.0), NO_MEDIUM);
     if (WITH_REFRACTION) c = LOAD_PAIR(p.states, 4u * k + 3u);
-    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y & 0xffffu, b.y >> 16, uintBitsToFloat(c.x), c.y);
+    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y & 0x7fffu, b.y >> 16, (b.y & 0x8000u) != 0u, uintBitsToFloat(c.x), c.y);
 }
 
 void store_state(uvec2 states, uint k, PathState s) {
     STORE_PAIR(states, 4u * k, floatBitsToUint(s.throughput.xy));
     STORE_PAIR(states, 4u * k + 1u, floatBitsToUint(vec2(s.throughput.z, s.pdf)));
-    STORE_PAIR(states, 4u * k + 2u, uvec2(s.index, s.depth | s.passes << 16));
+    STORE_PAIR(states, 4u * k + 2u, uvec2(s.index, s.depth | (s.is_single ? 0x8000u : 0u) | s.passes << 16));
     if (WITH_REFRACTION) STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), s.medium));
 }
 

@@ -6,6 +6,7 @@
 #define PATH_PATH
 #include "path/lights.glsl"
 #include "path/media.glsl"
+#include "path/scattering.glsl"
 #include "path/view.glsl"
 #include "path/ambient.glsl"
 #include "path/signal.glsl"
@@ -15,6 +16,9 @@ const uint BSDF_DIRECTION = 0u;
 const uint BSDF_LOBE = 1u;     // and Russian roulette
 const uint LIGHT_POINT_ON = 2u;  // which light, and where on it
 const uint DISTANT_LIGHT_ON = 3u; // the same of the sample of a distant light, where there is one of each group
+const uint FREE_FLIGHT = 4u;      // distance in a volume that scatters, and by which channel
+const uint SCATTERED = 5u;        // direction there
+const uint SCATTERED_ON = 6u;     // Russian roulette there
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
 const float MAX_SURVIVAL = 0.95;
@@ -128,8 +132,8 @@ LightShares last_shares(PathParams p, uint k, PathState state) {
 }
 
 // Next-event estimation: a shadow ray to a light of those that are wanted, and its contribution.
-void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension,
-                         uint wanted, LightShares shares) {
+void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 wo, uint beyond, Dispersion dispersion, uvec2 pixel, uint n,
+                         uint dimension, uint wanted, LightShares shares) {
     bool is_second = WITH_LIGHT_SPLIT && wanted == DISTANT_LIGHT;
     dimension += is_second ? DISTANT_LIGHT_ON : LIGHT_POINT_ON;
     bool chooses_among_many = WITH_LIGHT_TREE && p.placed_lights > MANY_LIGHTS && !is_second;
@@ -140,6 +144,7 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
+    if (HAS_DISPERSION && !stays_white(dispersion, m.ng, from_frame(m.frame, wo), l.wi)) c *= dispersion.weight;
     if (WITH_MIS && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
     if (!(highest(c) > 0.0)) return;
     float side = dot(m.ng, l.wi);
@@ -194,10 +199,41 @@ bool is_straight(Bsdf b, BsdfSample s, float side) {
     return s.delta && side < 0.0 && b.kind == BSDF_GLTF && !b.volume;
 }
 
+// Continues the path where particles of a volume send it. Scatterings are no bounces, but are counted, and end by roulette, as such.
+void scatter_path(BlockParams block, PathParams p, uint k, PathState state, Ray ray, float length_, uvec2 pixel, uint n, uint dimension) {
+    float brightest = highest(state.throughput);
+    if (!(brightest > 0.0)) return;
+    if (state.depth + state.passes >= p.options.rr_depth) {
+        float survival = min(brightest * state.eta_scale, MAX_SPECULAR_SURVIVAL);
+        if (sample_2d(block.seed, pixel, n, dimension + SCATTERED_ON).x >= survival) return;
+        state.throughput /= survival;
+    }
+    if (state.depth + state.passes == 0u) {
+        store_media(p, k, p.camera_media);
+        if (WITH_RAY_CONES) store_cone(p, k, cone_after(camera_cone(block, ray.direction), length_));
+    }
+    vec3 w = scattered_direction(ray.direction, SHADING_OF(state.medium).scatter_anisotropy, sample_2d(block.seed, pixel, n, dimension + SCATTERED));
+    state.pdf = -1.0;
+    state.passes++;
+    uint slot = append_ray(p.next, Ray(ray.origin + length_ * ray.direction, 0.0, w, INFINITY), k);
+    store_state(p.next_states, slot, state);
+}
+
 // k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
 vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     PathParams p = path_params();
-    state.throughput *= transmittance(state.medium, hit.t);
+    uvec2 pixel = path_pixel(block, state.index);
+    uint n = path_sample(block, state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
+    if (scatters(state.medium)) {
+        FreeFlight flight = free_flight(state.medium, state.throughput, hit.t, sample_2d(block.seed, pixel, n, dimension + FREE_FLIGHT));
+        state.throughput *= flight.weight;
+        if (flight.is_scattered) {
+            scatter_path(block, p, k, state, ray, flight.length_, pixel, n, dimension);
+            return vec3(0.0);
+        }
+    } else {
+        state.throughput *= transmittance(state.medium, hit.t);
+    }
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
@@ -245,6 +281,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     }
     Boundary boundary;
     boundary.medium = state.medium;
+    Dispersion dispersion = NO_DISPERSION;
     bool is_boundary = WITH_MEDIA && is_medium(m.material);
     if (WITH_MEDIA && state.depth + state.passes == 0u) store_media(p, k, p.camera_media);
     if (is_boundary) {
@@ -258,13 +295,17 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             pass_straight(p, k, state, s, m.ng, ray, cone);
             return vec3(0.0);
         }
-        m.bsdf.eta = boundary.eta;
+        float wavelength = D_LINE;
+        if (HAS_DISPERSION) {
+            float place = sample_2d(block.seed, pixel, n, WAVELENGTH).x;
+            wavelength = mix(WAVELENGTHS.x, WAVELENGTHS.y, place);
+            dispersion = dispersion_at(boundary, place, state.is_single);
+        }
+        m.bsdf.eta = relative_ior(boundary.medium, boundary.before, wavelength);
         // what does not refract is not blurred, either
-        if (abs(boundary.eta - 1.0) < MIN_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
+        if (abs(m.bsdf.eta - 1.0) < MIN_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
-    uvec2 pixel = path_pixel(block, state.index);
-    uint n = path_sample(block, state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     SignalVertex v = SignalVertex(SIGNAL_SEEN, false, vec3(0.0));
     if (WITH_SIGNAL) v = signal_vertex(p, k, state.depth + state.passes == 0u, m);
     if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, v, s, m, log_side, pixel, n);
@@ -289,7 +330,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         // a loop, so that drivers compile its body once
         uint last = splits ? DISTANT_LIGHT : ANY_LIGHT;
         for (uint wanted = splits ? PLACED_LIGHT : ANY_LIGHT; wanted <= last; wanted++) {
-            sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension, wanted, shares);
+            sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, dispersion, pixel, n, dimension, wanted, shares);
         }
     }
 
@@ -301,6 +342,10 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     // light sampling accounts for all other light
     if (WITH_SPECULAR_ONLY && !b.delta) return added;
     state.throughput *= b.weight;
+    if (HAS_DISPERSION && !stays_white(dispersion, m.ng, towards_viewer, b.wi)) {
+        state.throughput *= dispersion.weight;
+        state.is_single = true;
+    }
     float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return added;
     if (WITH_SIGNAL) signal_sampled(p, k, v, m, wo, b, side);

@@ -138,6 +138,9 @@ feature_set! {
     Anisotropy = "HAS_ANISOTROPY", "anisotropy";
     Iridescence = "HAS_IRIDESCENCE", "iridescence";
     DiffuseTransmission = "HAS_DIFFUSE_TRANSMISSION", "diffuse transmission";
+    Retroreflection = "HAS_RETROREFLECTION", "retroreflection";
+    Dispersion = "HAS_DISPERSION", "dispersion";
+    Scattering = "HAS_SCATTERING", "volumes that scatter";
     BaseColors = "HAS_BASE_COLORS", "base colours that vary over a surface";
     Emission = "HAS_EMISSION", "emissive surfaces";
     Compensation = "HAS_COMPENSATION", "energy compensation";
@@ -168,6 +171,7 @@ feature_set! {
     IridescenceThickness = "USE_IRIDESCENCE_THICKNESS", "iridescence thickness";
     DiffuseTransmission = "USE_DIFFUSE_TRANSMISSION", "diffuse transmission";
     DiffuseTransmissionColor = "USE_DIFFUSE_TRANSMISSION_COLOR", "diffuse transmission colour";
+    Retroreflection = "USE_RETROREFLECTION", "retroreflection";
 }
 
 feature_set! {

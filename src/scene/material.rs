@@ -193,6 +193,24 @@ impl Default for DiffuseTransmission {
     }
 }
 
+/// KHR_materials_retroreflection: light that returns to where it came from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Retroreflection {
+    /// Share of what is reflected specularly, 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (red).
+    pub texture: Option<TextureSlot>,
+}
+
+/// KHR_materials_volume_scatter: particles of a volume that send light another way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VolumeScatter {
+    /// Linear colour of a thick volume under light from everywhere; black does not scatter.
+    pub color: Vec3,
+    /// Mean cosine of the angle between the directions before and after, between -1 and 1.
+    pub anisotropy: f32,
+}
+
 /// Materials that replace one another by the variant of a scene (KHR_materials_variants).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VariantMaterials {
@@ -292,6 +310,12 @@ pub struct Material {
     pub iridescence: Iridescence,
     /// KHR_materials_diffuse_transmission.
     pub diffuse_transmission: DiffuseTransmission,
+    /// KHR_materials_retroreflection.
+    pub retroreflection: Retroreflection,
+    /// KHR_materials_volume_scatter.
+    pub volume_scatter: VolumeScatter,
+    /// KHR_materials_dispersion: 20 over the Abbe number of a volume; 0 without dispersion.
+    pub dispersion: f32,
     /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF
     /// material, unknown statements of an MTL file, `sigma[]` of `.brhan`. docs/materials.md lists
     /// those that are used.
@@ -331,6 +355,9 @@ impl Default for Material {
             anisotropy: Anisotropy::default(),
             iridescence: Iridescence::default(),
             diffuse_transmission: DiffuseTransmission::default(),
+            retroreflection: Retroreflection::default(),
+            volume_scatter: VolumeScatter::default(),
+            dispersion: 0.0,
             parameters: BTreeMap::new(),
         }
     }
@@ -338,7 +365,7 @@ impl Default for Material {
 
 impl Material {
     /// All texture slots, empty ones included.
-    pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 19] {
+    pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 20] {
         [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,
@@ -359,6 +386,7 @@ impl Material {
             &mut self.iridescence.thickness_texture,
             &mut self.diffuse_transmission.texture,
             &mut self.diffuse_transmission.color_texture,
+            &mut self.retroreflection.texture,
         ]
     }
 

@@ -84,7 +84,8 @@ impl TextureFeature {
             | Self::Occlusion
             | Self::Iridescence
             | Self::IridescenceThickness
-            | Self::DiffuseTransmission => Texels::Linear,
+            | Self::DiffuseTransmission
+            | Self::Retroreflection => Texels::Linear,
         }
     }
 
@@ -108,20 +109,28 @@ impl TextureFeature {
             Self::IridescenceThickness => m.iridescence.thickness_texture,
             Self::DiffuseTransmission => m.diffuse_transmission.texture,
             Self::DiffuseTransmissionColor => m.diffuse_transmission.color_texture,
+            Self::Retroreflection => m.retroreflection.texture,
         }
     }
 }
 
+/// Beyond this mean cosine the phase function is narrower than single precision samples it.
+const MAX_ANISOTROPY: f32 = 0.999;
+
 /// Whether and how the material transmits light: not at all, through a thin wall, or into a volume.
 fn walls(m: &Material) -> TransmissionMode {
     match m.kind {
-        MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
+        MaterialKind::MetallicRoughness
+            if !m.unlit && (m.transmission.factor > 0.0 || m.diffuse_transmission.factor > 0.0) =>
+        {
             // glTF's index of refraction 0 does not refract: such a material transmits straight on,
             // as a thin wall
             if m.transmission.thickness > 0.0 && m.ior != 0.0 {
                 TransmissionMode::Volume
-            } else {
+            } else if m.transmission.factor > 0.0 {
                 TransmissionMode::Thin
+            } else {
+                TransmissionMode::Opaque
             }
         }
         _ => TransmissionMode::Opaque,
@@ -136,6 +145,45 @@ pub(crate) fn is_medium(m: &Material) -> bool {
 /// Whether the volume absorbs light.
 pub(crate) fn absorbs(m: &Material) -> bool {
     absorption(m).iter().any(|&a| a > 0.0)
+}
+
+/// Whether the volume scatters light.
+pub(crate) fn scatters(m: &Material) -> bool {
+    absorbs(m) && m.volume_scatter.color.max_element() > 0.0
+}
+
+/// The albedo of a single scattering by that of many (Kulla and Conty, "Revisiting Physically Based
+/// Shading at Imageworks", SIGGRAPH 2017 course; KHR_materials_volume_scatter).
+fn scattered(m: &Material) -> [f32; 3] {
+    let single = |many: f32| {
+        let many = f64::from(many);
+        let s = 4.09712 + 4.20863 * many - (9.59217 + 41.6808 * many + 17.7126 * many * many).sqrt();
+        // the fit is a little off at both ends
+        if many <= 0.0 {
+            0.0
+        } else if many >= 1.0 {
+            1.0
+        } else {
+            (1.0 - s * s).clamp(0.0, 1.0) as f32
+        }
+    };
+    m.volume_scatter.color.to_array().map(single)
+}
+
+/// Whether the index of refraction of the volume depends on the wavelength.
+pub(crate) fn disperses(m: &Material) -> bool {
+    cauchy(m) > 0.0
+}
+
+/// The coefficient B of Cauchy's equation n = A + B / wavelength^2 in square micrometres, by the
+/// Abbe number (n_d - 1) / (n_F - n_C) and Fraunhofer's lines F and C (KHR_materials_dispersion).
+fn cauchy(m: &Material) -> f32 {
+    const F_LINE: f32 = 0.4861;
+    const C_LINE: f32 = 0.6563;
+    if walls(m) != TransmissionMode::Volume {
+        return 0.0;
+    }
+    (m.ior - 1.0).max(0.0) * (m.dispersion / 20.0) / (F_LINE.powi(-2) - C_LINE.powi(-2))
 }
 
 /// Whether light may pass straight through: a thin wall that is smooth, or that a roughness texture
@@ -210,6 +258,9 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
             (gltf && m.iridescence.factor > 0.0, MaterialFeature::Iridescence),
             (gltf && m.diffuse_transmission.factor > 0.0, MaterialFeature::DiffuseTransmission),
+            (gltf && m.retroreflection.factor > 0.0, MaterialFeature::Retroreflection),
+            (disperses(m), MaterialFeature::Dispersion),
+            (scatters(m), MaterialFeature::Scattering),
             (normal_maps, MaterialFeature::ShadingNormals),
             (separate, MaterialFeature::SeparateTangents),
             (varies, MaterialFeature::BaseColors),
@@ -265,7 +316,11 @@ pub(super) fn record(
         iridescence_ior: m.iridescence.ior,
         diffuse_transmission: m.diffuse_transmission.factor,
         diffuse_transmission_color: m.diffuse_transmission.color.to_array(),
-        reserved: [0; 3],
+        retroreflection: m.retroreflection.factor,
+        dispersion: cauchy(m),
+        scatter_anisotropy: m.volume_scatter.anisotropy.clamp(-MAX_ANISOTROPY, MAX_ANISOTROPY),
+        scattered: scattered(m),
+        reserved: 0,
         uses: slots(m, needs).map(texture),
     }
 }

@@ -478,3 +478,32 @@ fn numbers_out_of_range() {
         is_possible(&scene, &format!(".brhan, {value}"));
     }
 }
+
+#[test]
+fn what_volumes_and_signs_do_with_light() {
+    let scene = with_material(json!({ "extensions": {
+        "KHR_materials_volume": { "thicknessFactor": 1, "attenuationColor": [0.5, 0.5, 0.5], "attenuationDistance": 0.1 },
+        "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 1 },
+        "KHR_materials_volume_scatter": { "multiscatterColor": [0.8, 0.5, 0.2], "scatterAnisotropy": 0.3 },
+        "KHR_materials_dispersion": { "dispersion": 0.36 },
+        "KHR_materials_retroreflection": { "retroreflectionFactor": 0.7, "retroreflectionTexture": { "index": 1 } },
+    } }))
+    .load();
+    let m = material(&scene);
+    assert_eq!((m.dispersion, m.retroreflection.factor), (0.36, 0.7));
+    assert!(m.retroreflection.texture.is_some());
+    assert_eq!((m.volume_scatter.color, m.volume_scatter.anisotropy), (Vec3::new(0.8, 0.5, 0.2), 0.3));
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+
+    // beyond their ranges, and none at all
+    let scene = with_material(json!({ "extensions": {
+        "KHR_materials_volume_scatter": { "multiscatterColor": [2, 0, 0], "scatterAnisotropy": -3 },
+        "KHR_materials_retroreflection": {},
+        "KHR_materials_dispersion": { "dispersion": -1 },
+    } }))
+    .load();
+    let m = material(&scene);
+    assert_eq!((m.volume_scatter.color, m.volume_scatter.anisotropy), (Vec3::X, -1.0));
+    assert_eq!((m.dispersion, m.retroreflection.factor), (0.0, 0.0));
+    assert_eq!(scene.report.warnings.len(), 3, "{:?}", scene.report.warnings);
+}

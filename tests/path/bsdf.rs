@@ -5,7 +5,9 @@ use super::*;
 use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::interface::records::ray_set;
 use skylit::scene::TriangleMesh;
-use skylit::scene::material::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, Specular, Transmission};
+use skylit::scene::material::{
+    Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Retroreflection, Sheen, Specular, Transmission,
+};
 use skylit::shaders;
 use skylit::tracer::{Push, Stream};
 use std::f64::consts::PI;
@@ -126,6 +128,7 @@ pub(super) fn cases() -> Vec<Case> {
         |factor, nanometres, ior| Iridescence { factor, thickness: [0.0, nanometres], ior, ..Default::default() };
     let translucent =
         |factor, color: f32| DiffuseTransmission { factor, color: Vec3::splat(color), ..Default::default() };
+    let returning = |factor| Retroreflection { factor, texture: None };
     let no_specular = grey(0.0, 1.0);
     let rough = |sigma| Material { parameters: [("sigma".to_owned(), sigma)].into(), ..matte(1.0) };
     let ior = |eta: f64, c: Case| Case { eta: Some(eta), ..c };
@@ -194,6 +197,28 @@ pub(super) fn cases() -> Vec<Case> {
                 "translucent alone",
                 Material { diffuse_transmission: translucent(0.3, 1.0), specular: no_specular, ..gltf(0.0, 1.0) },
             )
+        },
+        case("retroreflective plastic", Material { retroreflection: returning(0.7), ..gltf(0.0, 0.4) }),
+        case("retroreflective metal", Material { retroreflection: returning(1.0), ..gltf(1.0, 0.5) }),
+        case(
+            "retroreflective anisotropic metal under a coat",
+            Material {
+                retroreflection: returning(0.5),
+                anisotropy: turned,
+                clearcoat: coat(1.0, 0.3),
+                ..gltf(1.0, 0.5)
+            },
+        ),
+        ior(
+            1.5,
+            case(
+                "retroreflective volume 0.5",
+                Material { retroreflection: returning(0.6), transmission: through(1.0, 1.0), ..gltf(0.0, 0.5) },
+            ),
+        ),
+        Case {
+            conserves: Some(1e-5),
+            ..case("smooth retroreflective metal", Material { retroreflection: returning(0.3), ..gltf(1.0, 0.0) })
         },
         ior(1.5, case("rough glass", brhan(MaterialKind::Glass, 0.6))),
         ior(1.5, Case { conserves: Some(1e-3), ..case("smooth glass", brhan(MaterialKind::Glass, 0.0)) }),
@@ -406,6 +431,49 @@ fn samples_follow_their_density(cases: &[Case], compensation: bool) {
     }
     println!("greatest: {worst:.2}; most light that goes on: {most:.4}");
     assert_validation_clean(&device);
+}
+
+/// What retroreflects looks, in each direction, as what does not from the mirror image of that direction; a half of both is their mean. Without roughness all
+/// that is reflected returns.
+#[test]
+fn gpu_retroreflection_is_reflection_of_the_mirror_image() {
+    let device = device();
+    let case = |material| Case { name: "", material, reciprocal: true, conserves: None, eta: None };
+    let returning =
+        |factor, below: Material| Material { retroreflection: Retroreflection { factor, texture: None }, ..below };
+    let colored = Material { base_color: glam::Vec4::new(0.9, 0.6, 0.2, 1.0), ..gltf(1.0, 0.4) };
+    let all = [
+        case(colored.clone()),
+        case(returning(1.0, colored.clone())),
+        case(returning(0.5, colored)),
+        case(returning(1.0, gltf(1.0, 0.0))),
+    ];
+    let scene = scene(&all);
+    let flat = FlatScene::for_paths(&scene);
+    let probe = Probe::new(&device, tracer(&device, TracerKind::Compute, &flat));
+    let pairs: Vec<_> = random(512, 3)
+        .iter()
+        .map(|u| (from_above(0.05 + 0.95 * u[0], 1.3), from_above(0.05 + 0.95 * u[1], 2.0 * PI * u[2])))
+        .collect();
+    let from = |part, is_mirrored: bool| {
+        let viewer = move |v: DVec3| if is_mirrored { DVec3::new(-v.x, -v.y, v.z) } else { v };
+        probe.ask_all(part, DVec3::Z, pairs.iter().map(move |&(a, b)| (viewer(a), Ask::At(b))))
+    };
+    let (plain, mirrored, returned, half) = (from(0, false), from(0, true), from(1, false), from(2, false));
+    let mut bright = 0;
+    for (k, (a, b)) in pairs.iter().enumerate() {
+        let scale = plain[k].f.max_element().max(mirrored[k].f.max_element());
+        let differs = |a: DVec3, b: DVec3| (a - b).abs().max_element() > 2e-4 * scale + 1e-7;
+        assert!(!differs(returned[k].f, mirrored[k].f), "{a} {b}: {} and {}", returned[k].f, mirrored[k].f);
+        let mean = 0.5 * (plain[k].f + mirrored[k].f);
+        assert!(!differs(half[k].f, mean), "{a} {b}: {} and {mean}", half[k].f);
+        bright += usize::from(differs(returned[k].f, plain[k].f));
+    }
+    assert!(bright > 400, "only {bright} of {} pairs tell the two apart", pairs.len());
+    let view = from_above(0.6, 0.4);
+    for a in probe.ask(3, view, DVec3::Z, &random(64, 2).into_iter().map(Ask::Sample).collect::<Vec<_>>()) {
+        assert!(a.delta && (a.wi - view).length() < 1e-5 && (a.weight - DVec3::ONE).length() < 1e-5, "{a:?}");
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod cli;
 #[cfg(feature = "cli")]
 mod denoise;
 mod direct;
+mod dispersion;
 mod emitters;
 mod film;
 mod frames;
@@ -24,6 +25,7 @@ mod materials;
 mod media;
 mod oren_nayar;
 mod portals;
+mod scattering;
 mod shading_normals;
 mod texture_filter;
 mod transport;

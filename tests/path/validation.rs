@@ -12,7 +12,8 @@ use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeatu
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{
-    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, Specular, TextureSlot, Transmission,
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Retroreflection, Sheen, Specular, TextureSlot,
+    Transmission,
 };
 use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
 
@@ -45,6 +46,7 @@ fn everything() -> Scene {
             color_texture: slot,
             ..Default::default()
         },
+        retroreflection: Retroreflection { factor: 0.5, texture: slot },
         alpha_mode: AlphaMode::Blend,
         ..Material::default()
     };

@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use super::params::INVALID;
 use crate::accel::flatten::FlatScene;
 use crate::scene::{Geometry, Instance, Material};
-use crate::tracer::shading::{absorbs, is_medium};
+use crate::tracer::shading::{absorbs, disperses, is_medium};
 
 /// Maximum number of volumes that a path can be in at once.
 const MAX_NESTED: usize = 4;
@@ -19,13 +19,13 @@ const DIRECTIONS: [DVec3; 3] = [
 ];
 
 /// Returns true if paths must track the volumes that they are in. The winding tells inside from
-/// outside in a scene with one volume that does not absorb.
+/// outside in a scene with one volume that neither absorbs nor disperses.
 pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
     used.dedup();
     let media: Vec<&Material> = used.into_iter().map(|m| &flat.scene.materials[m]).filter(|m| is_medium(m)).collect();
-    media.len() > 1 || media.iter().any(|m| absorbs(m))
+    media.len() > 1 || media.iter().any(|m| absorbs(m) || disperses(m))
 }
 
 /// Surfaces of the scene's volumes, in double precision.

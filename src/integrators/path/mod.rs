@@ -53,8 +53,8 @@ pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 const MIN_BOUNCES: u32 = 4;
 /// Maximum number of bounces per submission.
 const MAX_BOUNCES: u32 = 32;
-/// Launches beyond those of the bounces, for surfaces that paths pass straight through. A path
-/// counts such surfaces in 16 bits (`PathRecord::depth_passes`).
+/// Launches beyond those of the bounces, for surfaces that paths pass straight through and for
+/// scatterings in volumes. A path counts them in 16 bits (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
 /// Where the parameters of paths lie behind those of their block, bytes.
 const PARAMS_BYTES: u64 = size_of::<BlockParams>() as u64;

@@ -12,6 +12,8 @@ records! {
         RAY_SEED: uint = 3;
         /// Length of a ray of ambient light, where occlusion falls off with distance.
         AO_LENGTH: uint = 4;
+        /// Wavelength of a path that is refracted by dispersive volumes.
+        WAVELENGTH: uint = 5;
         /// First dimension pair of a path: vertex n begins at `PATH_FIRST + n * PATH_STRIDE`.
         PATH_FIRST: uint = 8;
         /// Number of dimension pairs per path vertex.

@@ -40,7 +40,8 @@ records! {
         sheen_color: vec3,
         /// Perceptual roughness of the sheen, 0 to 1.
         sheen_roughness: float,
-        /// Absorption coefficient of the volume, per scene unit.
+        /// Coefficient by which the volume attenuates light, per scene unit: what it absorbs and
+        /// what it scatters.
         absorption: vec3,
         /// One of `WALLS_*`: transmission mode.
         walls: uint,
@@ -68,8 +69,18 @@ records! {
         diffuse_transmission: float,
         /// Index of refraction of the thin film.
         iridescence_ior: float,
+        /// Retroreflection factor (KHR_materials_retroreflection).
+        retroreflection: float,
+        /// How fast the index of refraction falls with the wavelength, in square micrometres
+        /// (shaders/path/wavelength.glsl).
+        dispersion: float,
+        /// Mean cosine of the angle by which the volume scatters light, -1 to 1.
+        scatter_anisotropy: float,
+        /// Share of the light which the volume takes out of a ray that it scatters and does not
+        /// absorb.
+        scattered: vec3,
         /// Padding to a multiple of 16 bytes.
-        reserved: uint[3],
+        reserved: uint,
         /// Textures other than the base colour's, indexed by `TextureFeature`.
         uses: TextureUse[TextureFeature::ALL.len()],
     }

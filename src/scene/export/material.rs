@@ -160,6 +160,22 @@ impl Writer<'_> {
             self.texture(&mut e, "diffuseTransmissionColorTexture", &through.color_texture);
             self.extension("KHR_materials_diffuse_transmission", e);
         }
+        let retro = &m.retroreflection;
+        if *retro != Default::default() {
+            let mut e = json!({ "retroreflectionFactor": retro.factor });
+            self.texture(&mut e, "retroreflectionTexture", &retro.texture);
+            self.extension("KHR_materials_retroreflection", e);
+        }
+        let scatter = &m.volume_scatter;
+        if *scatter != Default::default() {
+            let e = json!({
+                "multiscatterColor": scatter.color.to_array(), "scatterAnisotropy": scatter.anisotropy,
+            });
+            self.extension("KHR_materials_volume_scatter", e);
+        }
+        if m.dispersion != 0.0 {
+            self.extension("KHR_materials_dispersion", json!({ "dispersion": m.dispersion }));
+        }
     }
 
     fn transmission(&mut self, t: &Transmission) {

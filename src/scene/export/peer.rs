@@ -182,6 +182,6 @@ fn material(m: &Material) -> Value {
         "transmittance": m.transmittance.to_array(),
         "unlit": m.unlit,
         // what a peer that has not heard of it must not pass over
-        "layers": m.clearcoat.factor != 0.0 || m.sheen.color != Vec3::ZERO || m.transmission.factor != 0.0 || m.anisotropy.strength != 0.0 || m.iridescence.factor != 0.0 || m.diffuse_transmission.factor != 0.0,
+        "layers": m.clearcoat.factor != 0.0 || m.sheen.color != Vec3::ZERO || m.transmission.factor != 0.0 || m.anisotropy.strength != 0.0 || m.iridescence.factor != 0.0 || m.diffuse_transmission.factor != 0.0 || m.retroreflection.factor != 0.0 || m.dispersion != 0.0 || m.volume_scatter != Default::default(),
     })
 }

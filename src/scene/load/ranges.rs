@@ -19,6 +19,7 @@ type Range = (f32, f32);
 const SHARE: Range = (0.0, 1.0);
 const AMOUNT: Range = (0.0, f32::MAX);
 const ANY: Range = (f32::MIN, f32::MAX);
+const COSINE: Range = (-1.0, 1.0);
 const REFRACTION: Range = (1.0, f32::MAX);
 
 /// The numbers of a material: what they are called, their range, and where they are.
@@ -57,6 +58,10 @@ fn numbers(m: &mut Material) -> Vec<(&'static str, Range, &mut [f32])> {
         ("a thickness of a thin film", AMOUNT, m.iridescence.thickness.as_mut_slice()),
         ("a diffuse transmission", SHARE, single(&mut m.diffuse_transmission.factor)),
         ("a colour of diffuse transmission", SHARE, m.diffuse_transmission.color.as_mut()),
+        ("a retroreflection", SHARE, single(&mut m.retroreflection.factor)),
+        ("a colour of volume scattering", SHARE, m.volume_scatter.color.as_mut()),
+        ("an anisotropy of volume scattering", COSINE, single(&mut m.volume_scatter.anisotropy)),
+        ("a dispersion", AMOUNT, single(&mut m.dispersion)),
     ];
 
     // what has a range of its own, or is not always there; 0 is glTF's word for a Fresnel term of 1

@@ -13,8 +13,8 @@ use serde_json::{Map, Value};
 use super::glossiness::{RoughnessTexture, SpecularGlossiness};
 use super::values::{text, valid};
 use crate::scene::material::{
-    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Material, Sheen, Specular, TextureSlot,
-    Transmission,
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Material, Retroreflection, Sheen, Specular,
+    TextureSlot, Transmission, VolumeScatter,
 };
 
 /// The extensions that the crate does not model; their names come with them.
@@ -95,6 +95,38 @@ struct DiffuseTransmissionJson {
 
 impl UnmodelledExtension for DiffuseTransmissionJson {
     const NAME: &str = "KHR_materials_diffuse_transmission";
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct RetroreflectionJson {
+    retroreflection_factor: f32,
+    retroreflection_texture: Option<Info>,
+}
+
+impl UnmodelledExtension for RetroreflectionJson {
+    const NAME: &str = "KHR_materials_retroreflection";
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct VolumeScatterJson {
+    multiscatter_color: [f32; 3],
+    scatter_anisotropy: f32,
+}
+
+impl UnmodelledExtension for VolumeScatterJson {
+    const NAME: &str = "KHR_materials_volume_scatter";
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct DispersionJson {
+    dispersion: f32,
+}
+
+impl UnmodelledExtension for DispersionJson {
+    const NAME: &str = "KHR_materials_dispersion";
 }
 
 /// The crate models it on textures of its type `Info` only, which those for normals and occlusion
@@ -190,6 +222,9 @@ pub(super) fn convert(
         anisotropy: AnisotropyJson::from_extensions(others)?.to_scene(),
         iridescence: IridescenceJson::from_extensions(others)?.to_scene(),
         diffuse_transmission: DiffuseTransmissionJson::from_extensions(others)?.to_scene(),
+        retroreflection: RetroreflectionJson::from_extensions(others)?.to_scene(),
+        volume_scatter: VolumeScatterJson::from_extensions(others)?.to_scene(),
+        dispersion: DispersionJson::from_extensions(others)?.dispersion,
         parameters: parameters(material),
         ..Material::default()
     };
@@ -296,6 +331,18 @@ impl DiffuseTransmissionJson {
             color: self.diffuse_transmission_color_factor.map_or(Vec3::ONE, Vec3::from),
             color_texture: slot(&self.diffuse_transmission_color_texture),
         }
+    }
+}
+
+impl VolumeScatterJson {
+    fn to_scene(&self) -> VolumeScatter {
+        VolumeScatter { color: self.multiscatter_color.into(), anisotropy: self.scatter_anisotropy }
+    }
+}
+
+impl RetroreflectionJson {
+    fn to_scene(&self) -> Retroreflection {
+        Retroreflection { factor: self.retroreflection_factor, texture: slot(&self.retroreflection_texture) }
     }
 }
 
