@@ -21,8 +21,9 @@ LightSample sphere_sample(PathParams p, LightRecord light, vec3 from, Shading m,
     vec3 l = to - b * wi;
     float distance = max(b - sqrt(max(light.radius * light.radius - dot(l, l), 0.0)), 0.0);
     // the nearest point of the sphere itself, from its centre: exact where from + distance * wi is not
-    vec3 point = light.position + (light.radius + light.lift) * normalize(from + distance * wi - light.position);
-    return LightSample(wi, distance, point, light.intensity, 1.0 / (2.0 * PI * cone), false);
+    vec3 normal = normalize(from + distance * wi - light.position);
+    vec3 point = light.position + (light.radius + light.lift) * normal;
+    return LightSample(wi, distance, point, light.intensity * sphere_emission_texture(light.instance, normal), 1.0 / (2.0 * PI * cone), false);
 }
 
 float sphere_pdf(LightRecord light, vec3 from, vec3 wi, float distance) {

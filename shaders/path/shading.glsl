@@ -25,12 +25,17 @@ float texcoord_area(SubmeshRecord submesh, uvec3 corners, uint set) {
     return abs(edge1.x * edge2.y - edge1.y * edge2.x);
 }
 
-// Value of a texture of a kind (TEXELS_*) at a point of a primitive (index in the BLAS), 1 without a texture. log_side: footprint().
+// Value of a texture of a kind (TEXELS_*) at a point of a primitive (index in the BLAS), 1 without a texture. uv: barycentrics, or texture coordinates of a sphere.
+// log_side: footprint().
 vec4 sample_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv, uint kind, float log_side) {
-    if (use.texture == INVALID || is_null(submesh.indices)) return vec4(1.0);
+    if (use.texture == INVALID) return vec4(1.0);
+    if (is_null(submesh.indices)) {
+        // without levels: the footprint is one of triangles
+        if (!HAS_SPHERES || submesh.sphere_textures == 0u) return vec4(1.0);
+        return sample_texture(use.texture, transform_texcoord(use.transform, use.offset, uv), kind != TEXELS_LINEAR);
+    }
     uvec3 corners = triangle_indices(submesh, primitive);
-    vec2 st = texcoord_at(submesh, corners, uv, use.set);
-    st = vec2(use.transform.x * st.x + use.transform.z * st.y, use.transform.y * st.x + use.transform.w * st.y) + use.offset;
+    vec2 st = transform_texcoord(use.transform, use.offset, texcoord_at(submesh, corners, uv, use.set));
     if (HAS_RAY_CONES && log_side > SHARP) {
         TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
         float area = texcoord_area(submesh, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
@@ -44,9 +49,8 @@ vec4 sample_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv, 
 // Linear base colour of a surface.
 vec3 shown_color(Surface s, SubmeshRecord submesh, MaterialRecord m, float log_side) {
     if (!HAS_BASE_COLORS) return m.base_color.rgb;
-    if (!HAS_RAY_CONES) return base_color(submesh, m, s.primitive, s.uv).rgb;
+    if (!HAS_RAY_CONES || is_null(submesh.indices)) return base_color(submesh, m, s.primitive, s.uv).rgb;
     vec3 color = m.base_color.rgb;
-    if (is_null(submesh.indices)) return color;
     color *= vertex_color(submesh, triangle_indices(submesh, s.primitive), s.uv).rgb;
     TextureUse use = TextureUse(m.texcoord_transform, m.texcoord_offset, m.base_color_texture, m.texcoord_set);
     // with alpha, colours are premultiplied: texels of alpha 0 do not contribute
@@ -61,6 +65,17 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     TextureUse use = SHADING_OF(submesh.material).uses[USE_EMISSION];
     // unfiltered: texture filtering applies to hits of paths only
     return sample_use(use, submesh, primitive + submesh.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
+}
+
+// The same of a point of a sphere with this unit normal in the world.
+vec3 sphere_emission_texture(uint instance, vec3 normal) {
+    if (!has_use(USE_EMISSION)) return vec3(1.0);
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 records = Pairs(root.scene_instances).v[instance];
+    SubmeshRecord submesh = load_submesh_record(root.submeshes, records.y);
+    if (submesh.sphere_textures == 0u) return vec3(1.0);
+    if (!SINGLE_LEVEL) normal = normalize(transform_vector(InstanceRecords(root.instances).v[records.x].world_to_group, normal));
+    return sample_use(SHADING_OF(submesh.material).uses[USE_EMISSION], submesh, submesh.first_primitive, sphere_texcoord(normal), TEXELS_SRGB, SHARP).rgb;
 }
 
 // Alpha of an emitter at a point of a primitive of an instance of the scene: the fraction of rays that hit it there.
@@ -179,6 +194,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     vec4 tangent = vec4(0.0);
     bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
     if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(submesh.tangents)) tangent = tangent_at(s, submesh, submesh.tangents);
+    if (HAS_SPHERES && submesh.sphere_textures != 0u) tangent = sphere_tangent(s);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(textures.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);

@@ -20,16 +20,24 @@ vec4 vertex_color(SubmeshRecord submesh, uvec3 corners, vec2 uv) {
     return load_quad(submesh.colors, corners.x) * (1.0 - uv.x - uv.y) + load_quad(submesh.colors, corners.y) * uv.x + load_quad(submesh.colors, corners.z) * uv.y;
 }
 
-// Linear base colour with alpha at barycentrics uv of a primitive (an index in the group). Spheres have no texture coordinates.
+// Texture coordinates that a transform (2x2, column by column) and an offset make of others.
+vec2 transform_texcoord(vec4 m, vec2 offset, vec2 st) { return vec2(m.x * st.x + m.z * st.y, m.y * st.x + m.w * st.y) + offset; }
+
+// Linear base colour with alpha at barycentrics uv of a primitive (an index in the group), or at texture coordinates uv of a sphere, whose alpha is the same
+// everywhere.
 vec4 base_color(SubmeshRecord submesh, MaterialRecord material, uint primitive, vec2 uv) {
     vec4 color = material.base_color;
-    if (is_null(submesh.indices)) return color;
+    if (is_null(submesh.indices)) {
+        if (HAS_SPHERES && submesh.sphere_textures != 0u && material.base_color_texture != INVALID) {
+            vec2 st = transform_texcoord(material.texcoord_transform, material.texcoord_offset, uv);
+            color.rgb *= sample_texture(material.base_color_texture, st, true).rgb;
+        }
+        return color;
+    }
     uvec3 corners = triangle_indices(submesh, primitive);
     color *= vertex_color(submesh, corners, uv);
     if (material.base_color_texture != INVALID) {
-        vec2 st = texcoord_at(submesh, corners, uv, material.texcoord_set);
-        vec4 m = material.texcoord_transform;
-        st = vec2(m.x * st.x + m.z * st.y, m.y * st.x + m.w * st.y) + material.texcoord_offset;
+        vec2 st = transform_texcoord(material.texcoord_transform, material.texcoord_offset, texcoord_at(submesh, corners, uv, material.texcoord_set));
         color *= sample_texture(material.base_color_texture, st, true);
     }
     return color;

@@ -1,6 +1,7 @@
 // Ray-sphere intersection.
 #ifndef SCENE_SPHERE
 #define SCENE_SPHERE
+#include "common/warp.glsl"
 
 // The nearest t in (tmin, tmax), or a value outside of it. The direction need not have unit length. Discriminant from
 // the perpendicular distance and stable roots: Haines, Gunther, Akenine-Moeller, "Precision Improvements for Ray/Sphere
@@ -21,6 +22,14 @@ float intersect_sphere(vec3 origin, vec3 direction, float tmin, float tmax, vec3
     float near = min(t0, t1);
     float far = max(t0, t1);
     return near > tmin ? near : far > tmin ? far : tmax;
+}
+
+// Texture coordinates of the point with a unit normal in object space: pbrt's u = phi / (2 pi) around the z axis, and theta / pi, which is its v turned over,
+// for v of images goes down. Sphere::texcoord of src/scene/mesh.rs.
+vec2 sphere_texcoord(vec3 n) {
+    float turns = turns_of(n.y, n.x);
+    // of an angle whose cosine is all but 1 its sine has the digits
+    return vec2(turns < 0.0 ? turns + 1.0 : turns, 2.0 * turns_of(length(n.xy), n.z));
 }
 
 #endif

@@ -3,6 +3,7 @@
 #define SCENE_SURFACE
 #include "scene/corners.glsl"
 #include "scene/material.glsl"
+#include "scene/sphere.glsl"
 
 struct Surface {
     vec3 position;   // world
@@ -122,6 +123,7 @@ Surface surface_at(Ray ray, Hit hit) {
         vec3 at = transform_point(instance.world_to_group, ray.origin) + hit.t * transform_vector(instance.world_to_group, ray.direction);
         normal = normalize(at - sphere.xyz);
         p = sphere.xyz + sphere.w * normal;
+        if (submesh.sphere_textures != 0u) s.uv = sphere_texcoord(normal);
         // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
         error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
     } else {
@@ -147,6 +149,19 @@ Surface surface_at(Ray ray, Hit hit) {
     s.ns = ns2 > 0.0 ? ns * inversesqrt(ns2) : s.ng;
     s.ns *= dot(s.ns, s.ng) < 0.0 ? -1.0 : 1.0;
     return s;
+}
+
+// Tangent of a sphere that has textures, along which u grows: as tangent_at.
+vec4 sphere_tangent(Surface s) {
+    vec2 c = on_circle(s.uv.x);
+    vec3 t = vec3(-c.y, c.x, 0.0);
+    float w = 1.0;
+    if (!SINGLE_LEVEL) {
+        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance].group_to_world;
+        t = normalize(transform_vector(rows, t));
+        if (dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz)) < 0.0) w = -w;
+    }
+    return vec4(t, w);
 }
 
 // Unit tangent (world space, not yet orthogonal to the normal) with handedness in w: the bitangent is w * cross(normal, tangent) about the normal of the

@@ -6,7 +6,7 @@
 //! is a group of its own with several TLAS instances. A group is the geometry of one BLAS. Most
 //! files end up as one group with one TLAS instance, and the top level is skipped altogether.
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::Aabb;
 use super::features::{AlphaClass, Blend, alpha_classes};
@@ -152,7 +152,10 @@ impl<'a> FlatScene<'a> {
                 }
                 let to_world = relative(instance.object_to_world);
                 let spheres = matches!(geometry, Geometry::Spheres(_));
-                if uses[instance.mesh] == 1 && !changes[instance.mesh] && (!spheres || is_similarity(&to_world)) {
+                if uses[instance.mesh] == 1
+                    && !changes[instance.mesh]
+                    && (!spheres || may_bake_spheres(scene, instance.mesh, &to_world))
+                {
                     world[spheres as usize].push(scene, instance.mesh, Some(k), to_world, tested);
                 } else {
                     let group = *own[instance.mesh].get_or_insert_with(|| {
@@ -194,6 +197,11 @@ impl<'a> FlatScene<'a> {
             |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
         self.blend == Blend::Stochastic
             && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
+    }
+
+    /// Whether a submesh consists of spheres whose material has textures.
+    pub fn has_sphere_textures(&self, part: &Submesh) -> bool {
+        matches!(self.scene.meshes[part.mesh].geometry, Geometry::Spheres(_)) && is_textured(self.scene, part.mesh)
     }
 
     /// Does the scene have analytic spheres?
@@ -270,6 +278,17 @@ fn place(part: &Submesh, p: Vec3) -> Vec3 {
 
 /// Is the transform a similarity (rotation, uniform scale, mirroring, translation), which maps
 /// spheres to spheres?
+/// Whether spheres can be placed in the world with the other ones: they stay spheres, and no
+/// texture turns with them.
+fn may_bake_spheres(scene: &Scene, mesh: usize, to_world: &DAffine3) -> bool {
+    is_similarity(to_world) && (!is_textured(scene, mesh) || to_world.matrix3 == DMat3::IDENTITY)
+}
+
+/// Whether the material of a mesh has textures.
+fn is_textured(scene: &Scene, mesh: usize) -> bool {
+    scene.materials[scene.meshes[mesh].material].textures().next().is_some()
+}
+
 fn is_similarity(t: &DAffine3) -> bool {
     let m = t.matrix3;
     let (a, b, c) = (m.x_axis.length_squared(), m.y_axis.length_squared(), m.z_axis.length_squared());

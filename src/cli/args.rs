@@ -7,7 +7,7 @@ use clap::{Args, ValueHint};
 
 use crate::integrators::rays::Mode;
 use crate::scene::SceneSettings;
-use crate::scene::load::{Confine, LoadOptions};
+use crate::scene::load::{Confine, LoadOptions, NormalSource, Projection, VertexOptions};
 use crate::settings::parse::parse_limit;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
@@ -18,6 +18,12 @@ pub struct LoadArgs {
     /// Scene of a glTF file that has several, by its name or its number from 0 [default: the one that the file names]
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Scene", hide_short_help = true)]
     pub gltf_scene: Option<String>,
+    /// Shading normals in place of the file's: file, flat, smooth, or smooth across edges at which the surface bends by up to ANGLE degrees [default: file, and flat where the file has none]
+    #[arg(long, value_name = "file|flat|smooth|ANGLE", help_heading = "Scene", hide_short_help = true)]
+    pub normals: Option<NormalSource>,
+    /// Texture coordinates for meshes that have none and whose material has textures, projected from the bounds of each mesh [default: none]
+    #[arg(long, value_enum, value_name = "PROJECTION", help_heading = "Scene", hide_short_help = true)]
+    pub uv: Option<Projection>,
     /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
     ///
     /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
@@ -28,7 +34,13 @@ pub struct LoadArgs {
 impl LoadArgs {
     /// The options of the loader.
     pub fn options(&self) -> LoadOptions<'_> {
-        LoadOptions { scene: self.gltf_scene.as_deref(), confine: self.confine(), ..LoadOptions::default() }
+        let (scene, confine, vertices) = (self.gltf_scene.as_deref(), self.confine(), self.vertices());
+        LoadOptions { scene, confine, vertices, ..LoadOptions::default() }
+    }
+
+    /// The normals and texture coordinates that the options ask for.
+    pub fn vertices(&self) -> VertexOptions {
+        VertexOptions { normals: self.normals.unwrap_or_default(), uv: self.uv }
     }
 
     /// Where the files must lie that a scene refers to.

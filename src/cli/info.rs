@@ -112,7 +112,9 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         "extensions": extensions,
         "files": scene.report.files,
         "normals_computed": scene.report.normals_computed,
+        "normals_replaced": scene.report.normals_replaced,
         "tangents_computed": scene.report.tangents_computed,
+        "texcoords_projected": scene.report.texcoords_projected,
         "inventory": inventory,
     });
 
@@ -214,6 +216,7 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         String::new()
     };
     add("surfaces", format!("{edges}{dropped}"));
+    scene.report.remarks().into_iter().for_each(|remark| add("vertices", remark));
 
     // materials and textures
     let named = |name: &String| if name.is_empty() { "without a name".to_owned() } else { name.clone() };

@@ -141,6 +141,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         scene: args.scene.clone(),
         gltf_scene: args.load.gltf_scene.clone(),
         confine,
+        vertices: args.load.vertices(),
         size: settings.image.size.unwrap_or(DEFAULT_SIZE),
         settings,
         device: device_settings,

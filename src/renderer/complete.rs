@@ -96,6 +96,7 @@ impl Renderer {
             camera.name = view.to_string();
         }
         choices.extend(clipped(&camera, &survey));
+        choices.extend(self.scene.report.remarks());
 
         // the AO radius
         if capabilities.contains(&Capability::AmbientOcclusion) {

@@ -1,5 +1,7 @@
 //! Shapes in object space.
 
+use std::f32::consts::{PI, TAU};
+
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// An indexed triangle mesh. All vertex arrays are empty or as long as `positions`.
@@ -30,6 +32,16 @@ pub struct Sphere {
     pub center: Vec3,
     /// Radius, above 0.
     pub radius: f32,
+}
+
+impl Sphere {
+    /// The texture coordinates of the point with this unit normal, in object space: pbrt's, which
+    /// are u = phi / (2 pi), from the x axis around the z axis, and v = 1 - theta / pi; here v goes
+    /// down, from 0 at the pole on the z axis. Shaders have theirs in shaders/scene/sphere.glsl.
+    pub fn texcoord(normal: Vec3) -> Vec2 {
+        let turn = normal.y.atan2(normal.x) / TAU;
+        Vec2::new(if turn < 0.0 { turn + 1.0 } else { turn }, normal.z.clamp(-1.0, 1.0).acos() / PI)
+    }
 }
 
 /// Geometry of a mesh.

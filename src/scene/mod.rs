@@ -76,6 +76,10 @@ pub struct LoadReport {
     pub degenerate_triangles: usize,
     /// Meshes whose normals were computed because the file had none.
     pub normals_computed: usize,
+    /// Meshes whose normals are those that [`load::VertexOptions::normals`] asks for.
+    pub normals_replaced: usize,
+    /// Meshes that got texture coordinates by [`load::VertexOptions::uv`].
+    pub texcoords_projected: usize,
     /// Meshes whose tangents were computed (MikkTSpace) because a normal map needs them and the
     /// file had none.
     pub tangents_computed: usize,
@@ -87,6 +91,14 @@ impl LoadReport {
         let n = self.degenerate_triangles;
         let dropped = (n > 0).then(|| format!("dropped {n} degenerate triangles"));
         self.warnings.iter().cloned().chain(dropped).collect()
+    }
+
+    /// What options have made of the meshes, a line each.
+    pub fn remarks(&self) -> Vec<String> {
+        let line = |count: usize, text: &str| (count > 0).then(|| text.replace('#', &count.to_string()));
+        let normals = line(self.normals_replaced, "normals of # meshes: computed from their triangles (--normals)");
+        let uv = line(self.texcoords_projected, "texture coordinates of # meshes without any: projected (--uv)");
+        normals.into_iter().chain(uv).collect()
     }
 }
 

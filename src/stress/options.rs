@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use crate::scene::load::VertexOptions;
+
 /// The amount of rays that are traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -38,4 +40,6 @@ pub struct Options {
     pub program: Option<PathBuf>,
     /// The scene may refer to files below its own folder alone.
     pub confine: bool,
+    /// Normals and texture coordinates of the scene.
+    pub vertices: VertexOptions,
 }

@@ -260,7 +260,7 @@ fn submesh_records(
                 material: flat.scene.meshes[part.mesh].material as u32,
                 scene_instance: part.scene_instance.map_or(INVALID, |i| i as u32),
                 mirrored: part.mirrored as u32,
-                reserved: 0,
+                sphere_textures: flat.has_sphere_textures(part).into(),
                 tangents: attributes.address(part, k, Attribute::Tangents(0)),
                 clearcoat_tangents: attributes.address(part, k, Attribute::Tangents(1)),
                 anisotropy_tangents: attributes.address(part, k, Attribute::Tangents(2)),

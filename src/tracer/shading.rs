@@ -244,8 +244,8 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
         let normal_maps =
             m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
         let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
-        let varies =
-            matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
+        let has_colors = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty());
+        let varies = has_colors || m.base_color_texture.is_some();
         for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
             textures.insert_if(slot.is_some(), feature);
         }

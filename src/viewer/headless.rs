@@ -34,7 +34,7 @@ pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
         let woken = woken.clone();
         Arc::new(move || woken.store(true, Ordering::Relaxed))
     };
-    let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.confine)?;
+    let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.load())?;
     let context = egui::Context::default();
     context.enable_accesskit();
     let mut app = App::new(options, mailbox, events);

@@ -1,7 +1,7 @@
 //! Options that the viewer starts with.
 
 use crate::renderer::RenderSettings;
-use crate::scene::load::Confine;
+use crate::scene::load::{Confine, LoadOptions, VertexOptions};
 use crate::tracer::DeviceSettings;
 
 /// Frame rate that is held on CPU drivers, frames per second.
@@ -29,6 +29,8 @@ pub struct ViewOptions {
     pub gltf_scene: Option<String>,
     /// Where the files lie that a scene may refer to, of scenes that are opened later, too.
     pub confine: Confine<'static>,
+    /// Normals and texture coordinates of all scenes that are opened.
+    pub vertices: VertexOptions,
     /// Settings of images.
     pub settings: RenderSettings,
     /// Device and tracer.
@@ -41,4 +43,11 @@ pub struct ViewOptions {
     pub painter: Painter,
     /// Name of the Vulkan device, for [`Painter::Vulkan`] to use the same.
     pub device_name: Option<String>,
+}
+
+impl ViewOptions {
+    /// How scenes are loaded.
+    pub fn load(&self) -> LoadOptions<'static> {
+        LoadOptions { confine: self.confine, vertices: self.vertices, ..LoadOptions::default() }
+    }
 }

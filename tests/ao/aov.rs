@@ -1,14 +1,18 @@
 //! Auxiliary outputs against the double-precision oracle's.
 
+use std::f64::consts::{PI, TAU};
+
 use bytemuck::Zeroable;
-use glam::{DAffine3, DQuat, DVec2, DVec3, DVec4};
+use glam::{Affine2, DAffine3, DQuat, DVec2, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 use skylit::film::NoControl;
 use skylit::integrators::aov::{self, AovPixel};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::scene::builtin::shapes;
-use skylit::scene::{Camera, Filter, Geometry, Instance, Mesh, Projection, Scene, Texture, Wrap};
+use skylit::scene::{
+    Camera, Filter, Geometry, Instance, Material, Mesh, Projection, Scene, Sphere, Texture, TextureSlot, Wrap,
+};
 
 use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
 
@@ -93,6 +97,13 @@ fn expected_aov(scene: &Scene, oracle: &Oracle, camera: &Camera, size: [u32; 2],
         Geometry::Spheres(s) => {
             let center = s[hit.primitive as usize].center.as_dvec3();
             let object = instance.object_to_world.inverse().transform_point3(ray.at(hit.t) + oracle.origin());
+            if let Some(slot) = material.base_color_texture {
+                // pbrt's coordinates, with v down
+                let n = (object - center).normalize();
+                let uv = DVec2::new((n.y.atan2(n.x) / TAU).rem_euclid(1.0), n.z.clamp(-1.0, 1.0).acos() / PI);
+                let uv = slot.transform.matrix2.as_dmat2() * uv + slot.transform.translation.as_dvec2();
+                color *= texture_color(&scene.textures[slot.texture], uv).extend(1.0);
+            }
             let ng = (normals * (object - center)).normalize();
             (ng, ng)
         }
@@ -114,10 +125,63 @@ fn expected_aov(scene: &Scene, oracle: &Oracle, camera: &Camera, size: [u32; 2],
     }
 }
 
+/// A globe of 8 x 4 fields, each with a colour of its own, as a material of the scene.
+fn add_globe(scene: &mut Scene, filter: Filter) -> usize {
+    let texels = (0..32).flat_map(|i| [32 * (i % 8) as u8 + 16, 64 * (i / 8) as u8 + 16, 200, 255]);
+    let texels = texels.collect::<Vec<u8>>().into();
+    scene.textures.push(Texture { name: String::new(), width: 8, height: 4, texels, wrap: [Wrap::Repeat; 2], filter });
+    let slot = TextureSlot { texture: scene.textures.len() - 1, texcoord: 0, transform: Affine2::IDENTITY };
+    scene.materials.push(Material { base_color_texture: Some(slot), ..Material::default() });
+    scene.materials.len() - 1
+}
+
+/// The field of a globe at each end of its axes, and between them, as the host computes it and as every tracer shows it.
+#[test]
+fn gpu_texture_coordinates_of_spheres() {
+    let device = device();
+    let mut scene = Scene::default();
+    let material = add_globe(&mut scene, Filter::Nearest);
+    scene.meshes.push(Mesh { name: String::new(), geometry: shapes::sphere(DVec3::new(3.0, 0.0, 0.0), 0.5), material });
+    // turned by a quarter about x: the pole at z is at -y
+    let turn = DAffine3::from_rotation_x(0.5 * PI);
+    scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: turn });
+    // just beside each end, so that no field's border is met; u is a turn from x to y, v goes down from z
+    let ends = [
+        (Vec3::X, [0, 2], [1e-3, -1e-3]),
+        (Vec3::Y, [2, 2], [1e-3, -1e-3]),
+        (Vec3::NEG_X, [4, 2], [1e-3, -1e-3]),
+        (Vec3::NEG_Y, [6, 2], [1e-3, -1e-3]),
+        (Vec3::Z, [0, 0], [1e-3, 1e-3]),
+        (Vec3::NEG_Z, [0, 3], [1e-3, 1e-3]),
+    ];
+    for (end, [column, row], [along, up]) in ends {
+        let (right, above) = if end.z == 0.0 { (Vec3::Z.cross(end), Vec3::Z) } else { (Vec3::X, Vec3::Y) };
+        let n = (end + along * right + up * above).normalize();
+        let uv = Sphere::texcoord(n);
+        assert_eq!([(uv.x * 8.0) as u32, (uv.y * 4.0) as u32], [column, row], "{end}: {uv}");
+        let centre = turn.transform_point3(DVec3::new(3.0, 0.0, 0.0));
+        let n = turn.matrix3 * n.as_dvec3();
+        let camera = Camera::look_at(centre + 2.0 * n, centre, n.any_orthonormal_vector(), 0.1);
+        let i = (8 * row + column) as usize;
+        let expected = texture_color(
+            &scene.textures[0],
+            DVec2::new((i % 8) as f64 + 0.5, (i / 8) as f64 + 0.5) / DVec2::new(8.0, 4.0),
+        );
+        for kind in tracers(&device) {
+            let tracer = tracer(&device, kind, &scene);
+            let got = aov::render(&tracer, &record(&scene, &camera, [1, 1]), [1, 1], &mut NoControl).unwrap()[0];
+            let color = DVec3::new(f64::from(got.red), f64::from(got.green), f64::from(got.blue));
+            assert!(color.abs_diff_eq(expected, 1e-5), "{kind}, {end}: {color} is not {expected}");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
 /// Everything at once: an ellipsoid, mirrored and stretched instances (in a group of their own and baked), spheres, smooth
 /// normals, textures with transforms, vertex colours.
 fn everything() -> Scene {
     let mut scene = scene("leaf-cards");
+    let globe = add_globe(&mut scene, Filter::Linear);
     let mut add = |geometry: Geometry, material: usize, transforms: &[DAffine3]| {
         scene.meshes.push(Mesh { name: String::new(), geometry, material });
         let mesh = scene.meshes.len() - 1;
@@ -138,6 +202,10 @@ fn everything() -> Scene {
         0,
         &[place(DVec3::splat(1.2), 0.2, 0.0, 1.8), place(DVec3::splat(-0.7), 0.2, 0.7, 1.8)],
     );
+    // textures turn with spheres, also with one that could be placed in the world with others
+    add(shapes::sphere(DVec3::new(0.0, 0.1, 0.0), 0.25), globe, &[place(DVec3::ONE, 0.7, -0.5, 1.8)]);
+    let two = [place(DVec3::new(-1.0, 1.0, 1.4), 2.0, -1.2, 1.7), place(DVec3::ONE, 0.0, 1.3, 1.7)];
+    add(shapes::sphere(DVec3::ZERO, 0.2), globe, &two);
     scene
 }
 

@@ -1,6 +1,6 @@
 //! `skylit info`: what is in a scene, and how to begin with it.
 
-use crate::common::command::{device, json, refuses, run};
+use crate::common::command::{device, json, place, refuses, run, stderr};
 
 #[test]
 fn files_are_described_without_a_device() {
@@ -31,4 +31,38 @@ fn gpu_a_camera_a_radius_and_an_exposure_are_suggested() {
         "{record}"
     );
     assert!(device["frame_ms"].as_f64().unwrap() > 0.0 && device["structure_bytes"].as_u64().unwrap() > 0, "{record}");
+}
+
+/// Of the warnings about a file `info` lists all, `render` the first and how many more there are; records have all.
+#[test]
+fn gpu_warnings_about_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = place(&folder, "a.obj");
+    std::fs::write(&scene, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nwibble\nusemtl m\nf 1 2 3\nf 1 1 2\n").unwrap();
+    let warnings = |args: &[&str]| {
+        let out = run(args);
+        assert!(out.status.success(), "{}", stderr(&out));
+        stderr(&out).lines().filter(|l| l.starts_with("skylit: warning: ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let listed = warnings(&["info", &scene, "--no-device"]);
+    for (warning, says) in listed.iter().zip(["l (1)", "`wibble` (line 6)", "`gone.mtl`", "1 degenerate triangles"]) {
+        assert!(warning.contains(says), "{says}: {listed:?}");
+    }
+    assert_eq!(listed.len(), 4, "{listed:?}");
+    refuses(&["info", &scene, "--no-device", "--normals", "rough"], 64, "0 to 180 degrees");
+    refuses(&["info", &scene, "--no-device", "--uv", "flat"], 64, "spherical");
+    let out = run(&["info", &scene, "--no-device", "--normals", "30"]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(text.contains("normals of 1 meshes: computed from their triangles (--normals)"), "{text}");
+    if !device() {
+        return;
+    }
+    let image = place(&folder, "a.png");
+    let render = ["render", &scene, "-o", &image, "--size", "8x8", "--spp", "1"];
+    let shown = warnings(&render);
+    let about_file: Vec<_> = shown.iter().filter(|w| listed.iter().any(|l| w.starts_with(l.as_str()))).collect();
+    assert_eq!(about_file.len(), 1, "{shown:?}");
+    assert!(about_file[0].starts_with(&listed[0]) && about_file[0].contains("(and 3 more about the file: `skylit info"));
+    let record = json(&run(&[&render[..], &["--json"]].concat()));
+    assert!(record["warnings"].as_array().unwrap().len() >= 4, "{record}");
 }

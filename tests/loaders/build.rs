@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use skylit::error::Result;
+use skylit::scene::load::{LoadOptions, Projection, VertexOptions, load_with};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use tempfile::TempDir;
 
@@ -170,6 +171,12 @@ pub fn load(path: &Path) -> Result<Scene> {
     skylit::scene::load::load(path.to_str().unwrap())
 }
 
+/// Loads with options for normals and texture coordinates.
+pub fn load_vertices(path: &Path, normals: &str, uv: Option<Projection>) -> Scene {
+    let vertices = VertexOptions { normals: normals.parse().unwrap(), uv };
+    load_with(path.to_str().unwrap(), &LoadOptions { vertices, ..LoadOptions::default() }).unwrap()
+}
+
 pub fn mesh(scene: &Scene, index: usize) -> &TriangleMesh {
     match &scene.meshes[index].geometry {
         Geometry::Triangles(t) => t,
@@ -182,7 +189,14 @@ pub fn corners(mesh: &TriangleMesh) -> Vec<[[f32; 3]; 3]> {
     mesh.indices.iter().map(|t| t.map(|i| mesh.positions[i as usize].to_array())).collect()
 }
 
-/// A PNG of one colour.
+/// A PNG whose texels are a function of column and row.
+pub fn png_of(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    let pixels = image::RgbaImage::from_fn(width, height, |x, y| image::Rgba(texel(x, y)));
+    pixels.write_to(&mut out, image::ImageFormat::Png).unwrap();
+    out.into_inner()
+}
+
 /// One texel of 16 bits a channel.
 pub fn png16(color: [u16; 4]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
@@ -191,6 +205,7 @@ pub fn png16(color: [u16; 4]) -> Vec<u8> {
     out.into_inner()
 }
 
+/// A PNG of one colour.
 pub fn png(width: u32, height: u32, color: [u8; 4]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let pixels = image::RgbaImage::from_pixel(width, height, image::Rgba(color));

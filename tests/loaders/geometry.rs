@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::json;
+use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::load::{LoadOptions, load_with};
 
 use crate::build::*;
@@ -375,6 +376,67 @@ fn tangents_split_vertices_where_texcoords_mirror() {
     assert_eq!(corners(m)[1], [QUAD[1], QUAD[3], QUAD[2]]);
     let handedness = |t: usize| m.indices[t].map(|i| m.tangents[i as usize].w);
     assert_eq!((handedness(0), handedness(1)), ([-1.0; 3], [1.0; 3]));
+}
+
+/// Normals by options of a glTF file, whose meshes are flat without any; a mesh that deforms keeps its shape.
+#[test]
+fn normals_of_options() {
+    // a tent: two quads over a ridge, bent by 90 degrees, with the corners of each its own
+    let corners = [
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 1.0],
+        [-1.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 0.0, 1.0],
+        [0.0, 1.0, 1.0f32],
+    ];
+    let mut doc = Doc::new();
+    let position = doc.positions(&corners);
+    let indices = doc.accessor(&[0, 3, 2, 0, 2, 1, 4, 7, 6, 4, 6, 5], U8, "SCALAR", 12);
+    let slide = doc.positions(&[[0.0, 3.0, 0.0]; 8]);
+    doc.primitive(
+        json!({ "attributes": { "POSITION": position }, "indices": indices, "targets": [{ "POSITION": slide }] }),
+    );
+    let folder = Folder::new();
+    for is_animated in [false, true] {
+        if is_animated {
+            let times = doc.accessor(&bytes(&[[0.0], [1.0f32]]), F32, "SCALAR", 2);
+            let weights = doc.accessor(&bytes(&[[0.0], [1.0f32]]), F32, "SCALAR", 2);
+            doc.push(
+                "animations",
+                json!({
+                    "samplers": [{ "input": times, "output": weights }],
+                    "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
+                }),
+            );
+        }
+        let path = folder.write("tent.gltf", doc.gltf());
+        assert!(mesh(&load_vertices(&path, "file", None), 0).normals.is_empty());
+        assert!(mesh(&load_vertices(&path, "flat", None), 0).normals.is_empty());
+        let left = Vec3::new(-1.0, 1.0, 0.0).normalize();
+        for (normals, ridge) in [("smooth", Vec3::Y), ("91", Vec3::Y), ("89", left)] {
+            let scene = load_vertices(&path, normals, None);
+            let m = mesh(&scene, 0);
+            assert_eq!((m.normals.len(), m.positions.len(), scene.report.normals_replaced), (8, 8, 1));
+            for (p, n) in m.positions.iter().zip(&m.normals).take(4) {
+                let expected = if p.x == 0.0 { ridge } else { left };
+                assert!(n.abs_diff_eq(expected, 1e-6), "{normals}: {p} {n}");
+            }
+            // vertices of the pose follow
+            if let Some(rig) = &scene.rig {
+                let mut pose = Pose::default();
+                rig.pose(0, 1.0, Playback::Once, &mut pose).unwrap();
+                let shape = &pose.meshes[0].shape;
+                assert!(shape.positions.iter().zip(&m.positions).all(|(a, b)| *a == *b + 3.0 * Vec3::Y));
+                assert!(shape.normals.iter().zip(&m.normals).all(|(a, b)| a.abs_diff_eq(*b, 1e-6)));
+            }
+        }
+    }
+    // built-in scenes have normals of options, too: a box of twelve triangles
+    let smooth = load_vertices(std::path::Path::new("builtin:closed-box"), "smooth", None);
+    assert!(smooth.report.normals_replaced > 0 && !mesh(&smooth, 0).normals.is_empty());
 }
 
 /// A file with two scenes: which one is loaded is an option.

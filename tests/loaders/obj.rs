@@ -376,7 +376,7 @@ fn warnings_are_bounded() {
     let folder = Folder::new();
     let mut mtl = String::new();
     for i in 0..2000 {
-        mtl += &format!("newmtl m{i}\nmap_Kd gone {i}.png\nmap_Ks s.png\nKd x\n");
+        mtl += &format!("newmtl m{i}\nmap_Kd gone {i}.png\nmap_Xs s.png\nKd x\nodd{i} on\n");
     }
     folder.write("a.mtl", mtl);
     let mut text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
@@ -391,7 +391,7 @@ fn warnings_are_bounded() {
         warnings.len(),
         warnings
     );
-    assert!(warnings.iter().any(|w| w.contains("map_Ks is not used (and 1999 more of this kind)")), "{warnings:?}");
+    assert!(warnings.iter().any(|w| w.contains("map_Xs is not used (and 1999 more of this kind)")), "{warnings:?}");
 }
 
 #[test]
@@ -601,8 +601,8 @@ fn maps_of_surfaces() {
          decal d.png\nmap_refl r.png\nbump -bm 2 half.png\nmap_RMA x.png\nmap_aat on\n",
     );
     let said = scene.report.warnings.join("\n");
-    for key in ["map_Ks", "map_Ns", "refl", "disp", "decal", "map_refl", "map_bump holds", "map_RMA"] {
-        assert!(said.contains(&format!("{key} ")), "{key}: {said}");
+    for key in ["`s.png` was", "map_Ns is", "refl is", "disp is", "decal is", "map_refl is", "map_RMA is"] {
+        assert!(said.contains(&format!("{key} not")), "{key}: {said}");
     }
     assert!(!said.contains("map_Ka") && !said.contains("map_aat"), "{said}");
 }
@@ -638,4 +638,201 @@ fn clearcoat_sheen_and_anisotropy() {
     assert_eq!((layers.anisotropy.strength, layers.anisotropy.rotation), (0.8, std::f32::consts::FRAC_PI_2));
     let none = material("none");
     assert_eq!((none.clearcoat, none.sheen, none.anisotropy), Default::default());
+}
+
+/// What a file says and nobody shows is named with how often it is said.
+#[test]
+fn statements_that_are_not_used() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\n#comment\nl 2 3\np 1\nwibble 7\n\nf 1 2 3\ncstype bspline\nwobble\nwibble 8\n";
+    let scene = Folder::new().load("a.obj", text).unwrap();
+    let expected = [
+        "statements of the .obj about points, lines, curves or their display are not used: cstype (1), l (2), p (1)",
+        "3 lines of the .obj begin with a word that is no statement of the format, and are not used: `wibble` (line 8), `wobble` (line 12)",
+    ];
+    assert_eq!(scene.report.warnings, expected);
+    let scene = Folder::new().load("a.obj", "s off\no a\ng b\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+}
+
+/// The normals of a material's normal map, row by row, of unit length up to the texels' rounding.
+fn normals_of(scene: &Scene) -> Vec<Vec3> {
+    let slot = scene.materials[0].normal_texture.unwrap();
+    let texels = &scene.textures[slot.texture].texels;
+    texels.iter().map(|[x, y, z, _]| 2.0 * Vec3::new(x, y, z) - 1.0).collect()
+}
+
+/// A ramp has the normal of its slope: a height of 1 is one texel, and `-bm` multiplies it.
+#[test]
+fn heights_become_normals() {
+    let folder = Folder::new();
+    let grey = |v: u32| [v as u8, v as u8, v as u8, 255];
+    folder.write("right.png", png_of(8, 4, |x, _| grey(16 * x)));
+    folder.write("down.png", png_of(4, 8, |_, y| grey(16 * y)));
+    folder.write("alpha.png", png_of(8, 4, |x, y| [200, (31 * y) as u8, 10, (16 * x) as u8]));
+    let check = |mtl: &str, expected: &dyn Fn(usize) -> Vec3| {
+        let scene = with_mtl(&folder, &format!("newmtl m\n{mtl}\n"));
+        assert!(scene.report.warnings.is_empty(), "{mtl}: {:?}", scene.report.warnings);
+        for (i, normal) in normals_of(&scene).into_iter().enumerate() {
+            assert!(normal.abs_diff_eq(expected(i).normalize(), 1e-4), "{mtl}, texel {i}: {normal}");
+        }
+        scene.materials[0].normal_scale
+    };
+    // higher to the right: it leans to the left, everywhere where the border is clamped
+    let slope = 16.0 / 255.0;
+    for key in ["bump", "map_Bump", "map_bump"] {
+        assert_eq!(check(&format!("{key} -clamp on -bm 3 right.png"), &|_| Vec3::new(-slope, 0.0, 1.0)), 3.0);
+    }
+    // higher downwards: it leans up, which is green above a half
+    assert_eq!(check("bump -clamp on down.png", &|_| Vec3::new(0.0, slope, 1.0)), 1.0);
+    // where it repeats, the border falls to the other side: by 7 steps over two texels, one of them up
+    let repeated = |i: usize| Vec3::new(if matches!(i % 8, 0 | 7) { 3.0 * slope } else { -slope }, 0.0, 1.0);
+    check("map_Bump right.png", &repeated);
+    // the range of -mm, and the channel of -imfchan
+    check("map_Bump -clamp on -mm 0.2 0.5 right.png", &|_| Vec3::new(-0.5 * slope, 0.0, 1.0));
+    check("map_Bump -clamp on -imfchan m alpha.png", &|_| Vec3::new(-slope, 0.0, 1.0));
+    // two materials with one map share its texels, whatever their -bm
+    let scene = with_mtl(&folder, "newmtl m\nbump right.png\nnewmtl n\nbump -bm 2 right.png\n");
+    assert_eq!((scene.textures.len(), scene.materials[1].normal_scale), (1, 2.0));
+    // a single texel has no slope
+    folder.write("one.png", png(1, 1, [77, 77, 77, 255]));
+    check("map_Bump one.png", &|_| Vec3::Z);
+    check("map_Bump -clamp on one.png", &|_| Vec3::Z);
+}
+
+/// Maps of specular colour, sheen, clearcoat and anisotropy.
+#[test]
+fn maps_of_layers() {
+    let folder = Folder::new();
+    folder.write("half.png", png(2, 2, [128, 64, 32, 255]));
+    let maps = "map_Ks half.png\nmap_Ps half.png\nmap_Pc half.png\nmap_Pcr -imfchan g half.png\nmap_aniso half.png\n";
+    let scene = with_mtl(&folder, &format!("newmtl m\n{maps}"));
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    let m = &scene.materials[0];
+    let texels = |slot: Option<skylit::scene::TextureSlot>| &scene.textures[slot.unwrap().texture].texels;
+    // factors that are missing leave it to the map
+    assert_eq!((m.sheen.color, m.sheen.roughness), (Vec3::ONE, 0.5));
+    assert_eq!((m.clearcoat.factor, m.clearcoat.roughness, m.anisotropy.strength), (1.0, 1.0, 1.0));
+    // a colour stays sRGB, a number that is read as sRGB comes out as it was
+    assert_eq!(texels(m.specular.color_texture).get(0)[..3], [128.0 / 255.0, 64.0 / 255.0, 32.0 / 255.0]);
+    let sheen = texels(m.sheen.color_texture).decode_srgb(3);
+    assert!(sheen[..3].iter().all(|v| (v - 128.0 / 255.0).abs() < 2e-3), "{sheen:?}");
+    assert_eq!(texels(m.clearcoat.texture).get(0)[0], 128.0 / 255.0);
+    assert_eq!(texels(m.clearcoat.roughness_texture).get(0)[1], 64.0 / 255.0);
+    // the direction of anisotropy is the tangent, its strength is blue
+    let [x, y, strength, _] = texels(m.anisotropy.texture).get(0);
+    assert_eq!((x, (y - 0.5).abs() < 2e-3, strength), (1.0, true, 128.0 / 255.0));
+    // factors that are there are multiplied by the map
+    let scene = with_mtl(&folder, &format!("newmtl m\nPs 0.5\nPc 0.25\nPcr 0.75\naniso 0.5\nNs 100\n{maps}"));
+    let m = &scene.materials[0];
+    assert_eq!((m.sheen.color, m.clearcoat.factor, m.clearcoat.roughness), (Vec3::splat(0.5), 0.25, 0.75));
+    assert_eq!((m.anisotropy.strength, m.roughness < 0.5), (0.5, true));
+    // a mirror and glass have no such layers
+    let scene = with_mtl(&folder, &format!("newmtl m\nillum 7\n{maps}"));
+    let said = scene.report.warnings.join("\n");
+    for key in ["map_Ks", "map_Ps", "map_Pc", "map_Pcr", "map_aniso"] {
+        assert!(said.contains(&format!("{key} of a mirror or glass is not used")), "{key}: {said}");
+    }
+    assert!(scene.textures.is_empty());
+}
+
+/// A cube of eight vertices, two of whose sides are of another material.
+const CUBE: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nvn 1 0 0\n\
+    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nusemtl other\nf 2 3 7 6\nf 1 5 8 4\n";
+
+/// Normals by an angle, whatever the file says of them.
+#[test]
+fn normals_by_an_angle() {
+    let folder = Folder::new();
+    let path = folder.write("a.obj", CUBE);
+    let outwards = |p: Vec3| p.normalize();
+    // all corners are alike: the mean by angle is the diagonal, also where the materials meet
+    for normals in ["smooth", "90.001"] {
+        let scene = load_vertices(&path, normals, None);
+        assert_eq!((scene.report.normals_replaced, scene.report.normals_computed), (2, 0));
+        for m in [mesh(&scene, 0), mesh(&scene, 1)] {
+            assert_eq!(m.positions.len(), 8, "{normals}");
+            for (p, n) in m.positions.iter().zip(&m.normals) {
+                assert!(n.abs_diff_eq(outwards(*p), 1e-6), "{normals}: {p} {n}");
+            }
+        }
+    }
+    // below a right angle each side is flat, with corners of its own
+    let scene = load_vertices(&path, "89", None);
+    let m = mesh(&scene, 0);
+    assert_eq!((m.positions.len(), m.indices.len()), (16, 8));
+    for t in &m.indices {
+        let [a, b, c] = t.map(|i| m.positions[i as usize]);
+        let normal = (b - a).cross(c - a).normalize();
+        assert!(t.iter().all(|i| m.normals[*i as usize].abs_diff_eq(normal, 1e-6)));
+    }
+    // the normals of the file go, and its smoothing groups count for nothing
+    let wrong = folder.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 1 0 0\ns 1\nf 1//1 2//1 3//1\nf 1 4 2\n");
+    assert_eq!(mesh(&load_vertices(&wrong, "file", None), 0).normals[0], Vec3::X);
+    assert!(mesh(&load_vertices(&wrong, "flat", None), 0).normals.is_empty());
+    let m = load_vertices(&wrong, "10", None);
+    assert!(mesh(&m, 0).normals.iter().all(|n| *n == Vec3::Z || *n == Vec3::Y), "{:?}", mesh(&m, 0).normals);
+    // a sheet of paper, modelled from both sides, stays two sheets
+    let sheet = folder.write("c.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf 4 3 2 1\n");
+    let scene = load_vertices(&sheet, "smooth", None);
+    let m = mesh(&scene, 0);
+    for t in &m.indices {
+        let [a, b, c] = t.map(|i| m.positions[i as usize]);
+        let side = (b - a).cross(c - a);
+        assert!(t.iter().all(|i| m.normals[*i as usize].dot(side) > 0.99), "{:?}", m.normals);
+    }
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    for odd in ["181", "-1", "nan", "rough", ""] {
+        assert!(odd.parse::<skylit::scene::load::NormalSource>().is_err(), "{odd}");
+    }
+}
+
+/// Meshes without texture coordinates get some where a texture needs them, and are named where not.
+#[test]
+fn projected_texture_coordinates() {
+    use skylit::scene::load::Projection;
+    let folder = Folder::new();
+    folder.write("t.png", png(2, 2, [10, 20, 30, 255]));
+    folder.write("a.mtl", "newmtl m\nmap_Kd t.png\nnewmtl plain\n");
+    // an octahedron twice as high as wide, and a triangle whose material has no texture
+    let shape = "v 1 0 0\nv 0 2 0\nv 0 0 1\nv -1 0 0\nv 0 -2 0\nv 0 0 -1\n";
+    let faces = "f 1 2 3\nf 3 2 4\nf 4 2 6\nf 6 2 1\nf 3 5 1\nf 4 5 3\nf 6 5 4\nf 1 5 6\n";
+    let text = format!("mtllib a.mtl\n{shape}o ball\nusemtl m\n{faces}o other\nusemtl plain\nf 1 2 3\n");
+    let path = folder.write("a.obj", &text);
+    let scene = load_vertices(&path, "file", None);
+    let expected =
+        "mesh `ball`: has no texture coordinates 0, which textures of its material `m` use: taken as zero; --uv box";
+    assert!(scene.report.warnings[0].starts_with(expected), "{:?}", scene.report.warnings);
+    assert_eq!((scene.report.warnings.len(), scene.report.texcoords_projected), (1, 0));
+
+    // where each vertex may be on the image
+    let found = |projection, at: [f32; 3]| {
+        let scene = load_vertices(&path, "file", Some(projection));
+        assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+        assert_eq!((scene.report.texcoords_projected, mesh(&scene, 1).texcoords[0].len()), (1, 0));
+        let m = mesh(&scene, 0);
+        assert_eq!(m.texcoords[0].len(), m.positions.len());
+        let of_vertex = m.positions.iter().zip(&m.texcoords[0]).filter(|(p, _)| p.to_array() == at);
+        let mut found: Vec<[f32; 2]> = of_vertex.map(|(_, t)| t.to_array().map(|x| (1e4 * x).round() / 1e4)).collect();
+        found.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        found
+    };
+    use Projection::{Box as Cube, Cylindrical, Spherical};
+    for projection in [Spherical, Cylindrical] {
+        assert_eq!(found(projection, [0.0, 0.0, 1.0]), [[0.5, 0.5]]);
+        assert_eq!(found(projection, [1.0, 0.0, 0.0]), [[0.75, 0.5]]);
+        assert_eq!(found(projection, [-1.0, 0.0, 0.0]), [[0.25, 0.5]]);
+        // at the seam it is at both ends of the image
+        assert_eq!(found(projection, [0.0, 0.0, -1.0]), [[0.0, 0.5], [1.0, 0.5]]);
+        // a pole is where the triangle is: in the middle of each of the four quarters
+        let top = [[0.125, 0.0], [0.375, 0.0], [0.625, 0.0], [0.875, 0.0]];
+        assert_eq!(found(projection, [0.0, 2.0, 0.0]), top);
+    }
+    // faces of an octahedron this high lean to x and z equally: the first of both counts
+    let box_at_top = found(Cube, [0.0, 2.0, 0.0]);
+    assert!(box_at_top.iter().all(|[u, v]| *u == 0.5 && *v == 0.0), "{box_at_top:?}");
+    assert_eq!(found(Cube, [0.0, 0.0, 1.0]), [[0.25, 0.5], [0.75, 0.5]]);
+    // coordinates of the file stay
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nusemtl m\nf 1/1 2/1 3/1\n";
+    let scene = load_vertices(&folder.write("b.obj", text), "file", Some(Spherical));
+    assert_eq!((mesh(&scene, 0).texcoords[0][0], scene.report.texcoords_projected), (Vec2::splat(0.5), 0));
 }

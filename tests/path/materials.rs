@@ -374,3 +374,81 @@ fn gpu_tracers_without_materials_are_refused() {
         assert!(error.to_string().contains(says), "{error}");
     }
 }
+
+/// A sphere has tangents along which its u grows, and a light whose texture is sampled as it is seen.
+#[test]
+fn gpu_textures_of_spheres() {
+    let device = device();
+    let slot = Some(TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY });
+    let with_map = |mut scene: Scene, texel: [u16; 4]| {
+        let texels = texel.to_vec().into();
+        let (wrap, filter) = ([Wrap::Repeat; 2], Filter::Nearest);
+        scene.textures.push(Texture { name: String::new(), width: 1, height: 1, texels, wrap, filter });
+        scene
+    };
+    // a map that bends normals to the right and up: by u, which grows from x to y, and to z
+    let encode = |x: f32| (65535.0 * (0.5 * x + 0.5)).round() as u16;
+    let t = Vec3::new(0.36, 0.48, 0.8);
+    let mapped = Material { normal_texture: slot, ..matte(1.0) };
+    let view =
+        PathOptions { view: Some(View::Normals), samples: SampleSettings::new([1, 1], 1, 7), ..Default::default() };
+    let turn = DAffine3::from_rotation_x(0.4);
+    for (what, to_world) in [("as it is", DAffine3::IDENTITY), ("turned", turn)] {
+        let at_x = Camera::look_at(
+            to_world.transform_point3(DVec3::new(3.0, 0.0, 0.0)),
+            DVec3::ZERO,
+            to_world.transform_vector3(DVec3::Z),
+            1e-3,
+        );
+        let mut scene = with_map(
+            scene_of(vec![(shapes::sphere(DVec3::ZERO, 1.0), mapped.clone())], at_x),
+            t.extend(1.0).to_array().map(encode),
+        );
+        scene.instances[0].object_to_world = to_world;
+        // at x the tangent is y, and up is z
+        let expected = to_world.matrix3.as_mat3() * Vec3::new(t.z, t.x, t.y);
+        let flat = FlatScene::for_paths(&scene);
+        for kind in picked(&device) {
+            let film = render(&tracer(&device, kind, &flat), &flat, &view).image.film;
+            let found = Vec3::from_slice(&film.mean);
+            assert!(found.abs_diff_eq(expected, 2e-3), "{what}, {kind}: {found} is not {expected}");
+        }
+    }
+
+    // a light beside the view, one half of which is black by its texture, and the same with the lit half turned away
+    let lamp = || shapes::sphere(DVec3::new(0.0, 0.0, 0.0), 0.5);
+    let ground = (sheet(-1.0), matte(0.5));
+    let beside = DAffine3::from_translation(DVec3::new(1.5, 0.0, 0.0));
+    let mean = |texels: [u16; 2], to_world: DAffine3, strategy: Strategy| {
+        let light = Material { emissive_texture: slot, ..emitter(5.0) };
+        let mut scene = scene_of(vec![(lamp(), light), ground.clone()], ahead());
+        scene.instances[0].object_to_world = to_world;
+        let rgba = texels.iter().flat_map(|v| [*v, *v, *v, u16::MAX]).collect::<Vec<u16>>().into();
+        let (wrap, filter) = ([Wrap::Repeat; 2], Filter::Nearest);
+        scene.textures.push(Texture { name: String::new(), width: 1, height: 2, texels: rgba, wrap, filter });
+        let flat = FlatScene::for_paths(&scene);
+        let settings = PathOptions { max_depth: 1, strategy, ..options(512) };
+        mean_of(&render(&tracer(&device, TracerKind::Compute, &flat), &flat, &settings).image.film)
+    };
+    let white = u16::MAX;
+    let (full, full_error) = mean([white, white], beside, Strategy::Mis);
+    let down = beside * DAffine3::from_rotation_x(std::f64::consts::PI);
+    // the upper half of the image is about z, and the ground sees the other
+    for (what, texels, to_world, share) in [
+        ("the half that is seen", [0, white], beside, None),
+        ("the same half", [white, 0], down, None),
+        ("a quarter of the light everywhere", [35199, 35199], beside, Some(0.25)),
+    ] {
+        let (lights, lights_error) = mean(texels, to_world, Strategy::Light);
+        let (bsdf, bsdf_error) = mean(texels, to_world, Strategy::Bsdf);
+        println!(
+            "{what}: {lights} +- {lights_error} by lights, {bsdf} +- {bsdf_error} by BSDFs, {full} of a white one"
+        );
+        assert!((lights - bsdf).abs() < 4.5 * (lights_error + bsdf_error), "{what}: {lights} {bsdf}");
+        match share {
+            Some(share) => assert!((lights / full - share).abs() < 0.01, "{what}: {lights} of {full} +- {full_error}"),
+            None => assert!(lights > 0.3 * full && lights < 0.98 * full, "{what}: {lights} of {full}"),
+        }
+    }
+    assert_validation_clean(&device);
+}

@@ -33,6 +33,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
         scene: scene.map(str::to_owned),
         gltf_scene: None,
         confine: Default::default(),
+        vertices: Default::default(),
         settings,
         device: Default::default(),
         size: [1000, 700],

@@ -60,6 +60,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     let console = args.verbosity.console();
     let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
     plan.check_scene(&renderer.scene().report.files)?;
+    let about_file = FileWarnings::new(args, &renderer);
     let mut stills = renderer.still_sequence(&args.settings)?;
     let mut progress = Progress::new("rendering frames", &console);
     let (mut records, mut warnings, mut finished) = (Vec::new(), Vec::new(), 0);
@@ -86,7 +87,8 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         // each once, and not for every frame
         for warning in &still.report.setup.warnings {
             if !warnings.contains(warning) {
-                progress.suspend(|| console.warning(warning));
+                let shown = about_file.shown(warning);
+                shown.iter().for_each(|text| progress.suspend(|| console.warning(text)));
                 warnings.push(warning.clone());
             }
         }
@@ -139,7 +141,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
         crate::renderer::still::intervals(&args.settings, &renderer.scene().hints, args.settings.spp(renderer.scene()));
     check_intervals(args, plan.clone(), &intervals, &renderer.scene().report.files)?;
 
-    let mut control = CliControl::new(args, console);
+    let mut control = CliControl::new(args, console, &renderer);
     let extras = StillExtras {
         keep_rays: args.dump_rays.is_some(),
         aov: args.depth_image.is_some(),
@@ -200,7 +202,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     interrupt::check()?;
 
     // a file for each frame, or one for all
-    let mut control = CliControl::new(args, console);
+    let mut control = CliControl::new(args, console, &renderer);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = frames.colour();
     let mut files =
@@ -273,16 +275,43 @@ impl Viewer {
     }
 }
 
+/// The warnings about a scene's file, of which the terminal gets the first and a count.
+struct FileWarnings {
+    scene: String,
+    list: Vec<String>,
+}
+
+impl FileWarnings {
+    fn new(args: &RenderArgs, renderer: &Renderer) -> Self {
+        Self { scene: args.scene.clone(), list: renderer.scene().report.all_warnings() }
+    }
+
+    /// The text of a warning in the terminal; `None` if a count stands for it.
+    fn shown(&self, warning: &str) -> Option<String> {
+        match (self.list.iter().position(|w| w == warning), self.list.len()) {
+            (Some(0), 2..) => Some(format!(
+                "{warning} (and {} more about the file: `skylit info {} --no-device` lists them)",
+                self.list.len() - 1,
+                self.scene
+            )),
+            (Some(1..), _) => None,
+            _ => Some(warning.to_owned()),
+        }
+    }
+}
+
 /// Progress bar and interruption by Ctrl-C; warnings are printed at once.
 struct CliControl {
     progress: ProgressControl,
     console: Console,
+    about_file: FileWarnings,
 }
 
 impl CliControl {
-    fn new(args: &RenderArgs, console: Console) -> Self {
+    fn new(args: &RenderArgs, console: Console, renderer: &Renderer) -> Self {
         let progress = Progress::new("rendering", &console);
-        Self { progress: ProgressControl { progress, keep_partial: args.keep_partial }, console }
+        let about_file = FileWarnings::new(args, renderer);
+        Self { progress: ProgressControl { progress, keep_partial: args.keep_partial }, console, about_file }
     }
 }
 
@@ -292,7 +321,9 @@ impl Control for CliControl {
     }
 
     fn warning(&mut self, text: &str) {
-        self.progress.progress.suspend(|| self.console.warning(&crate::terminal::console::one_line(text)));
+        if let Some(text) = self.about_file.shown(text) {
+            self.progress.progress.suspend(|| self.console.warning(&crate::terminal::console::one_line(&text)));
+        }
     }
 
     fn should_stop(&mut self) -> Result<bool> {

@@ -104,8 +104,8 @@ records! {
         scene_instance: uint,
         /// 1: the vertices were baked through a mirroring transform, which reversed their winding.
         mirrored: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// 1: spheres whose material has textures; their points have texture coordinates.
+        sphere_textures: uint,
         /// 4 floats per vertex of the submesh: tangents; 0: required by no material.
         tangents: address,
         /// Tangents of the clearcoat's normal map, likewise; 0: `tangents`.

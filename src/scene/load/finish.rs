@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::{normals, ranges, tangents};
+use super::options::VertexOptions;
+use super::{normals, ranges, tangents, vertices};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::MAX_COORDINATE;
@@ -21,8 +22,9 @@ const MIN_EXTENT: f64 = 1e-12;
 /// Largest element of an inverse transform, for the same reason.
 const MAX_INVERSE: f64 = 1e30;
 
-/// Checks and repairs `scene`, which was read from `path`.
-pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<()> {
+/// Checks and repairs `scene`, which was read from `path`, and gives its meshes the normals and
+/// texture coordinates of `options`.
+pub(super) fn finish(scene: &mut Scene, path: &Path, options: VertexOptions, budget: &Budget) -> Result<()> {
     check(scene, path)?;
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
@@ -32,7 +34,9 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<
     bake_singular(scene, budget);
     budget.check().map_err(|e| e.in_file(path))?;
     drop_unplaced(scene);
+    vertices::apply(scene, options, budget).map_err(|e| e.in_file(path))?;
 
+    // each mesh by itself
     let materials = &scene.materials;
     let deforming = match &mut scene.rig {
         Some(rig) => rig.deformations_mut(scene.meshes.len()),
@@ -44,7 +48,7 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, budget: &Budget) -> Result<
     for note in notes {
         scene.report.warnings.extend(note.warnings);
         scene.report.degenerate_triangles += note.degenerate;
-        scene.report.normals_computed += usize::from(note.flat);
+        scene.report.normals_computed += usize::from(note.flat && scene.report.normals_replaced == 0);
         scene.report.tangents_computed += usize::from(note.tangents);
     }
     if scene.rig.is_some() {
@@ -213,10 +217,13 @@ fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Def
     let mut warn = |text: String| notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
 
     // texture coordinates and colours
-    for slot in materials.iter().flat_map(|m| m.textures()) {
+    for (material, slot) in materials.iter().flat_map(|m| m.textures().map(move |slot| (m, slot))) {
         let set = &mut triangles.texcoords[slot.texcoord];
         if set.is_empty() {
-            warn(format!("has no texture coordinates {}, which its material uses: taken as zero", slot.texcoord));
+            let (number, name) = (slot.texcoord, &material.name);
+            warn(format!(
+                "has no texture coordinates {number}, which textures of its material `{name}` use: taken as zero; --uv box (or spherical, cylindrical) makes some"
+            ));
             set.resize(triangles.positions.len(), glam::Vec2::ZERO);
         }
     }

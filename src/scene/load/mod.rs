@@ -16,9 +16,13 @@ mod normals;
 mod obj;
 mod options;
 mod picture;
+mod projection;
 mod ranges;
+mod smoothing;
+mod split;
 mod tangents;
 mod text;
+mod vertices;
 mod warnings;
 
 use std::path::{Path, PathBuf};
@@ -26,7 +30,7 @@ use std::path::{Path, PathBuf};
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
-pub use options::{ImagesDecoded, LoadOptions, is_in_progress};
+pub use options::{ImagesDecoded, LoadOptions, NormalSource, Projection, VertexOptions, is_in_progress};
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;
@@ -65,14 +69,16 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
         return Err(Error::Usage(format!("--gltf-scene {scene}: {source} is no glTF file, which may have several")));
     }
     if let Some(name) = source.strip_prefix("builtin:") {
-        return builtin::by_name(name)
-            .ok_or_else(|| Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them")));
+        return match builtin::by_name(name) {
+            Some(scene) => with_vertices(scene, options),
+            None => Err(Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them"))),
+        };
     }
     let path = Path::new(source);
     let extension = extension(path);
     if !FORMATS.contains(&extension.as_str()) && !path.is_file() {
         if let Some(scene) = builtin::by_name(source) {
-            return Ok(scene);
+            return with_vertices(scene, options);
         }
         if extension.is_empty() && !path.exists() {
             return Err(Error::input(
@@ -82,6 +88,15 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
         }
     }
     load_file_with(path, options)
+}
+
+/// A built-in scene with the normals and texture coordinates of the options.
+fn with_vertices(mut scene: Scene, options: &LoadOptions) -> Result<Scene> {
+    if options.vertices != VertexOptions::default() {
+        let name = scene.name.clone();
+        finish::finish(&mut scene, Path::new(&name), options.vertices, &Budget::default())?;
+    }
+    Ok(scene)
 }
 
 /// The files that a scene is read from: models, materials, buffers and images, also those that
@@ -120,7 +135,7 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     if let Some(chosen) = options.scene {
         scene.name = format!("{}, scene {chosen}", scene.name);
     }
-    finish::finish(&mut scene, path, &budget)?;
+    finish::finish(&mut scene, path, options.vertices, &budget)?;
     scene.report.warnings = warnings::bounded(std::mem::take(&mut scene.report.warnings));
     Ok(scene)
 }

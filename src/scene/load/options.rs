@@ -1,9 +1,63 @@
 //! Options of loading, and the count of loads in progress.
 
+use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::confine::Confine;
 use crate::memory::Budget;
+use crate::settings::choices;
+
+choices! {
+    /// Projections that give meshes without texture coordinates some. Axes are those of the mesh: y
+    /// up, z to the front.
+    pub enum Projection {
+        /// From the centre of the mesh's bounds, as a map of the world: u around the y axis, v from the top down
+        Spherical = "spherical",
+        /// Around the y axis through the centre of the mesh's bounds; v over their height
+        Cylindrical = "cylindrical",
+        /// Each triangle on the side of a cube that it faces, whose sides are as long as the longest of the mesh's bounds
+        Box = "box",
+    }
+}
+
+/// Where the shading normals of meshes come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum NormalSource {
+    /// The file: its normals, or its smoothing groups; flat where it has neither.
+    #[default]
+    File,
+    /// The triangles: every mesh is flat.
+    Flat,
+    /// The triangles around a vertex, across edges at which a surface bends by this angle or less,
+    /// in degrees from 0 to 180.
+    Smooth(f64),
+}
+
+impl FromStr for NormalSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "file" => Ok(Self::File),
+            "flat" => Ok(Self::Flat),
+            "smooth" => Ok(Self::Smooth(180.0)),
+            number => match number.parse() {
+                Ok(degrees) if (0.0..=180.0).contains(&degrees) => Ok(Self::Smooth(degrees)),
+                _ => Err("file, flat, smooth or an angle from 0 to 180 degrees expected".to_owned()),
+            },
+        }
+    }
+}
+
+/// What vertices get in place of what the file says of them, or where it says nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VertexOptions {
+    /// Shading normals.
+    pub normals: NormalSource,
+    /// Texture coordinates of meshes that have none and whose material has textures; `None`: zero,
+    /// with a warning.
+    pub uv: Option<Projection>,
+}
 
 /// Options of loading a scene.
 #[derive(Clone, Copy)]
@@ -19,6 +73,8 @@ pub struct LoadOptions<'a> {
     /// Scene of a glTF file, by its name or, where none is called that, its number; `None`: the one
     /// that the file names, or else its first.
     pub scene: Option<&'a str>,
+    /// Normals and texture coordinates, also of built-in scenes.
+    pub vertices: VertexOptions,
 }
 
 /// Images decoded so far.
@@ -32,7 +88,13 @@ pub struct ImagesDecoded {
 
 impl Default for LoadOptions<'_> {
     fn default() -> Self {
-        Self { textures: true, progress: &|_| (), confine: Confine::Nowhere, scene: None }
+        Self {
+            textures: true,
+            progress: &|_| (),
+            confine: Confine::Nowhere,
+            scene: None,
+            vertices: VertexOptions::default(),
+        }
     }
 }
 

@@ -89,7 +89,7 @@ pub fn run(options: &ViewOptions) -> Result<()> {
         // a window that is closed needs no waking
         Arc::new(move || drop(proxy.send_event(Wake::At(Instant::now()))))
     };
-    let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.confine)?;
+    let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.load())?;
     let context = egui::Context::default();
     {
         let proxy = proxy.clone();

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::load::{self, Confine, ImagesDecoded, LoadOptions};
+use crate::scene::load::{self, ImagesDecoded, LoadOptions};
 use crate::viewer::request::{Event, EventSender, Mailbox};
 
 /// Scene or images that have been loaded.
@@ -33,15 +33,15 @@ pub struct Loader {
 
 impl Loader {
     /// Starts to load a file or `builtin:NAME`. `gltf_scene`: which of the file's scenes;
-    /// `confine`: where the files lie that it may refer to. Progress is sent as events; `mailbox`
-    /// is woken for every part.
+    /// `options`: how scenes are loaded. Progress is sent as events; `mailbox` is woken for every
+    /// part.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] when there can be no further thread.
     pub fn start(
         source: &str,
         gltf_scene: Option<&str>,
-        confine: Confine<'static>,
+        options: LoadOptions<'static>,
         mailbox: &Arc<Mailbox>,
         events: &EventSender,
     ) -> Result<Self> {
@@ -50,7 +50,7 @@ impl Loader {
         let job = Job {
             source: source.to_owned(),
             gltf_scene: gltf_scene.map(str::to_owned),
-            confine,
+            options,
             parts: sender,
             wake: Wake { mailbox: mailbox.clone(), is_ready: is_ready.clone() },
             is_cancelled: is_cancelled.clone(),
@@ -105,7 +105,7 @@ impl Drop for Loader {
 struct Job {
     source: String,
     gltf_scene: Option<String>,
-    confine: Confine<'static>,
+    options: LoadOptions<'static>,
     parts: SyncSender<Result<Loaded>>,
     is_cancelled: Arc<AtomicBool>,
     events: EventSender,
@@ -137,7 +137,7 @@ impl Job {
         };
         load::load_with(
             &self.source,
-            &LoadOptions { textures, progress: &progress, confine: self.confine, scene: self.gltf_scene.as_deref() },
+            &LoadOptions { textures, progress: &progress, scene: self.gltf_scene.as_deref(), ..self.options },
         )
     }
 

@@ -24,7 +24,7 @@ use crate::output::{self, ImageFormat};
 use crate::renderer::interactive::View;
 use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
-use crate::scene::load::Confine;
+use crate::scene::load::LoadOptions;
 use crate::scene::{Camera, Scene, SceneSettings};
 use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
@@ -41,17 +41,17 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// A comparison may take this share of the time.
 const COMPARISON_SHARE: u32 = 5;
 
-/// Starts the thread. `confine`: where the files lie that scenes may refer to.
+/// Starts the thread. `load`: how scenes are loaded.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] when there can be no further thread.
-pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender, confine: Confine<'static>) -> Result<JoinHandle<()>> {
+pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender, load: LoadOptions<'static>) -> Result<JoinHandle<()>> {
     let run = move || {
         let reporter = events.clone();
         let worker = Worker {
             mailbox,
             events,
-            confine,
+            load,
             open: None,
             device_losses: 0,
             listed_devices: false,
@@ -71,7 +71,7 @@ pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender, confine: Confine<'stati
 struct Worker {
     mailbox: Arc<Mailbox>,
     events: EventSender,
-    confine: Confine<'static>,
+    load: LoadOptions<'static>,
     open: Option<OpenScene>,
     device_losses: u32,
     listed_devices: bool,
@@ -169,8 +169,7 @@ impl Worker {
         request: &Request,
         device: Option<Arc<Device>>,
     ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
-        let mut loader =
-            Loader::start(source, request.gltf_scene.as_deref(), self.confine, &self.mailbox, &self.events)?;
+        let mut loader = Loader::start(source, request.gltf_scene.as_deref(), self.load, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),
             None => Device::open(&request.device.options()),

@@ -102,7 +102,8 @@ impl<'a> MaterialLibrary<'a> {
         let diffuse = m.diffuse.unwrap_or(Vec3::splat(0.8));
         let specular = m.specular.unwrap_or(Vec3::ZERO);
         let kind = kind(m, diffuse, specular);
-        let of_exponent = || m.shininess.filter(|_| specular.max_element() > 0.0).map_or(1.0, roughness);
+        let shines = specular.max_element() > 0.0 || m.map_specular.is_some();
+        let of_exponent = || m.shininess.filter(|_| shines).map_or(1.0, roughness);
         let mut out = Material {
             name: text::shown(&m.name),
             kind,
@@ -127,8 +128,9 @@ impl<'a> MaterialLibrary<'a> {
         if out.emissive_texture.is_some() && out.emissive == Vec3::ZERO {
             out.emissive = Vec3::ONE;
         }
-        self.normal_map(&mut out, m, file, beside, scene);
+        self.normal_map(&mut out, m, beside, scene);
         self.surface_maps(&mut out, m, file, beside, scene);
+        self.layer_maps(&mut out, m, file, beside, scene);
         if let Some(ambient) = &m.map_ambient
             && m.map_diffuse.as_ref().is_none_or(|d| d.file != ambient.file)
         {
@@ -159,30 +161,62 @@ impl<'a> MaterialLibrary<'a> {
     }
 
     /// The normal map: `norm`, or what is called a bump map and holds normals, as Blender writes
-    /// it.
-    fn normal_map(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
+    /// it, or heights, as the format says.
+    fn normal_map(&mut self, out: &mut Material, m: &MtlMaterial, beside: [&Path; 2], scene: &mut Scene) {
         let bump = m.map_bump.as_ref().filter(|_| m.map_normal.is_none());
-        if let Some(bump) = bump {
-            match self.textures.picture(bump, beside, &mut scene.report) {
-                Some(picture) if is_normal_map(&picture.texels) => {}
-                Some(_) => {
-                    let what = "map_bump holds heights, which are not used: bake them into a normal map, norm";
-                    scene.report.warnings.push(format!("{file}: {what}"));
-                    return;
-                }
-                None => return,
+        let holds_heights = bump.is_some_and(|bump| {
+            let picture = self.textures.picture(bump, beside, &mut scene.report);
+            picture.is_some_and(|picture| !is_normal_map(&picture.texels))
+        });
+        let Some(map) = m.map_normal.as_ref().or(bump) else { return };
+        out.normal_texture = if holds_heights {
+            self.textures.heights(Some(map), beside, scene)
+        } else {
+            self.textures.color(Some(map), None, beside, scene)
+        };
+        out.normal_scale = map.multiplier;
+    }
+
+    /// Maps of the specular colour, sheen, clearcoat and anisotropy. As with colours, a factor that
+    /// is missing or zero leaves it to the map.
+    fn layer_maps(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
+        let maps = [
+            ("map_Ks", &m.map_specular),
+            ("map_Ps", &m.map_sheen),
+            ("map_Pc", &m.map_clearcoat),
+            ("map_Pcr", &m.map_clearcoat_roughness),
+            ("map_aniso", &m.map_anisotropy),
+        ];
+        if out.kind != MaterialKind::MetallicRoughness {
+            for (key, _) in maps.iter().filter(|(_, map)| map.is_some()) {
+                scene.report.warnings.push(format!("{file}: {key} of a mirror or glass is not used"));
             }
+            return;
         }
-        if let Some(map) = m.map_normal.as_ref().or(bump) {
-            out.normal_texture = self.textures.color(Some(map), None, beside, scene);
-            out.normal_scale = map.multiplier;
+        let textures = &mut self.textures;
+        out.specular.color_texture = textures.color(m.map_specular.as_ref(), None, beside, scene);
+        out.sheen.color_texture = textures.encoded_grey(m.map_sheen.as_ref(), beside, scene);
+        if out.sheen.color_texture.is_some() && out.sheen.color == Vec3::ZERO {
+            (out.sheen.color, out.sheen.roughness) = (Vec3::ONE, SHEEN_ROUGHNESS);
+        }
+        out.clearcoat.texture = textures.grey(m.map_clearcoat.as_ref(), beside, scene);
+        if out.clearcoat.texture.is_some() && out.clearcoat.factor == 0.0 {
+            out.clearcoat.factor = 1.0;
+        }
+        out.clearcoat.roughness_texture = textures.grey(m.map_clearcoat_roughness.as_ref(), beside, scene);
+        if out.clearcoat.roughness_texture.is_some() && out.clearcoat.roughness == 0.0 {
+            out.clearcoat.roughness = 1.0;
+        }
+        out.anisotropy.texture = textures.anisotropy(m.map_anisotropy.as_ref(), beside, scene);
+        if out.anisotropy.texture.is_some() && out.anisotropy.strength == 0.0 {
+            out.anisotropy.strength = 1.0;
         }
     }
 
     /// Roughness and metalness by maps: `map_Pr`, or the exponents of `map_Ns`, and `map_Pm`.
     fn surface_maps(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
         // exponents are of no use without a highlight, or beside a roughness
-        let shines = m.specular.is_some_and(|s| s.max_element() > 0.0);
+        let shines = m.specular.is_some_and(|s| s.max_element() > 0.0) || m.map_specular.is_some();
         let shininess = m.shininess.filter(|_| shines && m.roughness.is_none() && m.map_roughness.is_none());
         let exponents = m.map_shininess.as_ref().filter(|_| shininess.is_some());
         if m.map_shininess.is_some() && exponents.is_none() {

@@ -27,7 +27,7 @@ use material::MaterialLibrary;
 use parse::{Group, NONE, ObjFile};
 
 use super::find;
-use super::options::Loading;
+use super::options::{Loading, NormalSource};
 use super::text::{self, unquoted, without_comment};
 use crate::error::Result;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh, distant_centre};
@@ -50,6 +50,8 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         scene.report.warnings.push(format!("{} numbers have a decimal comma: read as a point", file.decimal_commas));
     }
 
+    scene.report.warnings.extend(unused_statements(&file));
+
     // materials
     let mut materials = MaterialLibrary::new(loading);
     let is_complete = read_libraries(&file, path, &mut materials, &mut scene)?;
@@ -59,7 +61,12 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
 
     // meshes
     let origin = origin(&file);
-    scene.report.normals_computed += smooth::smooth(&mut file);
+    if loading.options.vertices.normals == NormalSource::File {
+        scene.report.normals_computed += smooth::smooth(&mut file);
+    } else {
+        // the file's would only split vertices
+        file.groups.iter_mut().flat_map(|g| g.triangles.iter_mut().flatten()).for_each(|c| c.normal = NONE);
+    }
     let mut keys = PositionKeys::new(file.positions.len());
     for group in std::mem::take(&mut file.groups) {
         let material = match &group.material {
@@ -84,6 +91,24 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
     }
     Ok(scene)
+}
+
+/// Warnings that name statements which are not used.
+fn unused_statements(file: &ObjFile) -> Vec<String> {
+    let list: Vec<String> = file.unused.iter().map(|(key, count)| format!("{key} ({count})")).collect();
+    let unused = (!list.is_empty()).then(|| {
+        let list = list.join(", ");
+        format!("statements of the .obj about points, lines, curves or their display are not used: {list}")
+    });
+    let (words, count) = &file.unknown;
+    let shown = words.iter().map(|(word, line)| format!("`{}` (line {line})", text::shown(word)));
+    let unknown = (*count > 0).then(|| {
+        let list = shown.collect::<Vec<_>>().join(", ");
+        format!(
+            "{count} lines of the .obj begin with a word that is no statement of the format, and are not used: {list}"
+        )
+    });
+    unused.into_iter().chain(unknown).collect()
 }
 
 fn push(scene: &mut Scene, material: Material) -> usize {

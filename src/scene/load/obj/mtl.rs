@@ -12,6 +12,8 @@ use crate::scene::load::text::{self, trim, unquoted, without_comment};
 pub(super) struct Map {
     /// Name of the file as written, a comment included: a name may hold ` #`.
     pub file: String,
+    /// Options that are written and not used.
+    pub unused: Vec<&'static str>,
     /// `-clamp on`.
     pub clamp: bool,
     /// `-s` and `-o`, turned into glTF's convention (v down).
@@ -20,6 +22,43 @@ pub(super) struct Map {
     pub multiplier: f32,
     /// `-mm`: base and gain of texels.
     pub range: [f32; 2],
+    /// `-imfchan`: the channel that a map of numbers is read from.
+    pub channel: Option<MapChannel>,
+}
+
+/// A channel of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum MapChannel {
+    Red,
+    Green,
+    Blue,
+    Alpha,
+    Luminance,
+}
+
+impl MapChannel {
+    /// The channel that `-imfchan` calls so; `z`, of depth, is in no picture that is read.
+    fn from_letter(letter: &str) -> Option<Self> {
+        match letter {
+            "r" => Some(Self::Red),
+            "g" => Some(Self::Green),
+            "b" => Some(Self::Blue),
+            "m" => Some(Self::Alpha),
+            "l" => Some(Self::Luminance),
+            _ => None,
+        }
+    }
+
+    /// Its value of a texel.
+    pub fn value(self, [r, g, b, a]: [f32; 4]) -> f32 {
+        match self {
+            Self::Red => r,
+            Self::Green => g,
+            Self::Blue => b,
+            Self::Alpha => a,
+            Self::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+        }
+    }
 }
 
 impl Map {
@@ -55,9 +94,18 @@ pub(super) struct MtlMaterial {
     pub map_roughness: Option<Map>,
     pub map_metallic: Option<Map>,
     pub map_shininess: Option<Map>,
+    pub map_specular: Option<Map>,
+    pub map_sheen: Option<Map>,
+    pub map_clearcoat: Option<Map>,
+    pub map_clearcoat_roughness: Option<Map>,
+    pub map_anisotropy: Option<Map>,
     /// Numbers of statements that are not the format's.
     pub parameters: BTreeMap<String, f32>,
 }
+
+/// Numbers of [`MtlMaterial::parameters`] that have a meaning here: layers, and the roughness of
+/// Oren-Nayar's model.
+const PARAMETERS: [&str; 6] = ["Pc", "Pcr", "Ps", "aniso", "anisor", "sigma"];
 
 /// Parses a library. Lines that make no sense are noted with their number and skipped: a broken
 /// material must not hide the model.
@@ -71,16 +119,23 @@ pub(super) fn parse(source: &str, warn: &mut dyn FnMut(String)) -> Vec<MtlMateri
             materials.push(MtlMaterial { name: rest.to_owned(), ..Default::default() });
         } else if let Some(material) = materials.last_mut()
             && !key.starts_with('#')
-            && let Err(e) = statement(material, key, rest)
         {
-            warn(format!("line {}: {e}", number + 1));
+            let mut notes = Vec::new();
+            let failed = statement(material, key, rest, &mut notes).err();
+            notes.into_iter().chain(failed).for_each(|note| warn(format!("line {}: {note}", number + 1)));
         }
     }
     materials
 }
 
-fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), String> {
+/// Reads a statement. `notes`: options of maps that are not used.
+fn statement(material: &mut MtlMaterial, key: &str, rest: &str, notes: &mut Vec<String>) -> Result<(), String> {
     let values = without_comment(rest);
+    let mut map = |text: &str| {
+        let map = map(text)?;
+        notes.extend(map.unused.iter().map(|option| format!("{option} of {} is not used", plain(key))));
+        Ok::<_, String>(map)
+    };
 
     // exporters write keys in any case
     match key.to_ascii_lowercase().as_str() {
@@ -108,15 +163,28 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
         "map_pr" => material.map_roughness = Some(map(rest)?),
         "map_pm" => material.map_metallic = Some(map(rest)?),
         "map_ns" => material.map_shininess = Some(map(rest)?),
+        "map_ks" => material.map_specular = Some(map(rest)?),
+        "map_ps" => material.map_sheen = Some(map(rest)?),
+        "map_pc" => material.map_clearcoat = Some(map(rest)?),
+        "map_pcr" => material.map_clearcoat_roughness = Some(map(rest)?),
+        "map_aniso" => material.map_anisotropy = Some(map(rest)?),
         "norm" | "map_norm" | "map_kn" => material.map_normal = Some(map(rest)?),
         "bump" | "map_bump" => material.map_bump = Some(map(rest)?),
         // whether textures are smoothed
         "map_aat" => {}
+        // light from nowhere, which path tracing has no use for; most files say something of it
+        "ka" => drop(color(values)?),
         "refl" | "disp" | "decal" => return Err(unused(key)),
         other if other.starts_with("map_") => return Err(unused(key)),
+        "" => {}
         _ => {
-            if let Ok(value) = number(values) {
-                material.parameters.insert(key.to_owned(), value);
+            let known = PARAMETERS.iter().find(|name| name.eq_ignore_ascii_case(key));
+            // a number that nothing here uses is kept under its name all the same
+            let value = if known.is_some() { Some(number(values)?) } else { number(values).ok() };
+            let name = known.copied().unwrap_or(key);
+            material.parameters.extend(value.map(|value| (name.to_owned(), value)));
+            if known.is_none() {
+                return Err(format!("`{}` is no statement that is used", text::shown(key)));
             }
         }
     }
@@ -126,8 +194,12 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
 /// Says that a map has no effect. The key is outside of quotation marks, so that each kind is said
 /// once.
 pub(super) fn unused(key: &str) -> String {
-    let key: String = key.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
-    format!("{key} is not used")
+    format!("{} is not used", plain(key))
+}
+
+/// The letters, digits and underscores of a word.
+fn plain(key: &str) -> String {
+    key.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '_').collect()
 }
 
 fn number(text: &str) -> Result<f32, String> {
@@ -178,7 +250,15 @@ const OPTIONS: [(&str, usize); 13] = [
 /// it.
 fn map(text: &str) -> Result<Map, String> {
     let transform = Affine2::IDENTITY;
-    let mut map = Map { file: String::new(), clamp: false, transform, multiplier: 1.0, range: [0.0, 1.0] };
+    let mut map = Map {
+        file: String::new(),
+        unused: Vec::new(),
+        clamp: false,
+        transform,
+        multiplier: 1.0,
+        range: [0.0, 1.0],
+        channel: None,
+    };
 
     // options stand before the name and behind it, which thus ends where one begins
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
@@ -202,13 +282,19 @@ fn map(text: &str) -> Result<Map, String> {
             map.file = trim(&name[..name.len() - rest.len()]).to_owned();
         }
         rest = after_values;
+        let text = word(after).0;
         match option {
-            "-clamp" => map.clamp = word(after).0 == "on",
+            "-clamp" => map.clamp = text == "on",
+            "-imfchan" if MapChannel::from_letter(text).is_some() => map.channel = MapChannel::from_letter(text),
             "-bm" => map.multiplier = values[0],
             "-mm" => map.range = [values[0], if count > 1 { values[1] } else { 1.0 }],
             "-s" => scale = Vec2::new(values[0], if count > 1 { values[1] } else { 1.0 }),
             "-o" => offset = Vec2::new(values[0], if count > 1 { values[1] } else { 0.0 }),
-            _ => {}
+            // as they are without the option
+            "-blendu" | "-blendv" if text == "on" => {}
+            "-cc" if text == "off" => {}
+            "-boost" | "-t" if values == [0.0; 3] => {}
+            _ => map.unused.extend(OPTIONS.iter().map(|(name, _)| *name).find(|name| *name == option)),
         }
     }
 
@@ -280,10 +366,34 @@ mod tests {
         let m = parse("newmtl a\nKd 1 2\nKs 0.5\nd nan\nillum x", &mut |w| warnings.push(w));
         assert_eq!((m.len(), warnings.len(), m[0].specular), (1, 3, Some(Vec3::splat(0.5))), "{warnings:?}");
         let mut warnings = Vec::new();
-        let m = parse("newmtl a\rKD 1 0,5 0 # red\rmap_Ks s.png\rdisp h.png\rmap_aat on\r#map_Ks", &mut |w| {
-            warnings.push(w)
-        });
+        let text = "newmtl a\rKD 1 0,5 0 # red\rmap_Xs s.png\rdisp h.png\rmap_aat on\r#map_Xs\rKa 1 0 0\rPC 0.5";
+        let m = parse(text, &mut |w| warnings.push(w));
         assert_eq!(m[0].diffuse, Some(Vec3::new(1.0, 0.5, 0.0)));
-        assert_eq!(warnings, ["line 3: map_Ks is not used", "line 4: disp is not used"]);
+        assert_eq!(m[0].parameters.get("Pc"), Some(&0.5));
+        assert_eq!(warnings, ["line 3: map_Xs is not used", "line 4: disp is not used"]);
+    }
+
+    /// Statements and options without an effect are named; those that say what is so anyway are not.
+    #[test]
+    fn what_is_not_used_is_named() {
+        let mut warnings = Vec::new();
+        let text = "newmtl a\nsharpness 60\nxyzzy on\nmap_Pr -cc on -boost 2 -t 0 0 0 -imfchan g r.png\n\
+                    map_Pm -imfchan z -blendu on -blendv off m.png\nsigma 0.5\nPs x";
+        let m = parse(text, &mut |w| warnings.push(w));
+        assert_eq!(m[0].parameters.get("sharpness"), Some(&60.0));
+        assert_eq!(m[0].map_roughness.as_ref().unwrap().channel, Some(MapChannel::Green));
+        let expected = [
+            "line 2: `sharpness` is no statement that is used",
+            "line 3: `xyzzy` is no statement that is used",
+            "line 4: -cc of map_Pr is not used",
+            "line 4: -boost of map_Pr is not used",
+            "line 5: -imfchan of map_Pm is not used",
+            "line 5: -blendv of map_Pm is not used",
+            "line 7: `x` is not a number: ignored",
+        ];
+        assert_eq!(warnings, expected);
+        // colour is weighed as the eye does, and alpha is a channel
+        assert_eq!([MapChannel::Green, MapChannel::Alpha].map(|c| c.value([0.1, 0.2, 0.3, 0.4])), [0.2, 0.4]);
+        assert!((MapChannel::Luminance.value([1.0; 4]) - 1.0).abs() < 1e-6);
     }
 }

@@ -1,5 +1,6 @@
 //! The statements of an OBJ file.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::SplitAsciiWhitespace;
 
@@ -9,6 +10,49 @@ use super::polygon::{self, PolygonTriangulator};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::load::text::{self, Lines, trim};
+
+/// Statements of the format about what is not shown: points, lines, free-form curves and surfaces,
+/// and how others display the file.
+const UNUSED: [&str; 35] = [
+    "bevel",
+    "bmat",
+    "bsp",
+    "bzp",
+    "c_interp",
+    "call",
+    "cdc",
+    "cdp",
+    "con",
+    "csh",
+    "cstype",
+    "ctech",
+    "curv",
+    "curv2",
+    "d_interp",
+    "deg",
+    "end",
+    "hole",
+    "l",
+    "lod",
+    "maplib",
+    "mg",
+    "p",
+    "parm",
+    "res",
+    "scrv",
+    "shadow_obj",
+    "sp",
+    "stech",
+    "step",
+    "surf",
+    "trace_obj",
+    "trim",
+    "usemap",
+    "vp",
+];
+
+/// Distinct unknown words that are kept for a warning; a file of another kind has any number.
+const MAX_UNKNOWN: usize = 4;
 
 /// No such index.
 pub(super) const NONE: u32 = u32::MAX;
@@ -50,6 +94,11 @@ pub(super) struct ObjFile {
     pub large_polygons: usize,
     /// Numbers with a decimal comma.
     pub decimal_commas: usize,
+    /// How often the file has each of the [`UNUSED`] statements that it has.
+    pub unused: BTreeMap<&'static str, usize>,
+    /// Words that are no statement of the format, each with the number of its first line, and how
+    /// many lines begin with such a word.
+    pub unknown: (Vec<(String, usize)>, usize),
 }
 
 /// Parses a file; errors name the line.
@@ -64,6 +113,9 @@ pub(super) fn parse(path: &Path, budget: &Budget) -> Result<ObjFile> {
             Some(line) => parser.line(&line).err(),
             None => return Ok(parser.file),
         };
+        if let Some(word) = parser.unknown.take() {
+            parser.file.unknown.0.push((word, lines.number));
+        }
         if let Some(e) = failed {
             return Err(Error::input(path, format!("line {}: {}", lines.number, text::shown(&e))));
         }
@@ -77,6 +129,8 @@ struct Parser {
     material: Option<String>,
     /// Whether name or material changed since the last face.
     changed: bool,
+    /// A word of the last line that is no statement, to be kept with the line's number.
+    unknown: Option<String>,
     /// Number of the smoothing group; 0: flat.
     smoothing: u32,
     polygon: Vec<Corner>,
@@ -120,8 +174,26 @@ impl Parser {
                 self.file.libraries.push(rest.to_owned());
                 Ok(())
             }
-            // points, lines, curves, comments: nothing to show
-            _ => Ok(()),
+            _ => {
+                self.skip(key);
+                Ok(())
+            }
+        }
+    }
+
+    /// Notes a statement that is not used.
+    fn skip(&mut self, key: &str) {
+        if key.is_empty() || key.starts_with('#') {
+            return;
+        }
+        if let Some(known) = UNUSED.iter().find(|k| **k == key) {
+            *self.file.unused.entry(known).or_default() += 1;
+            return;
+        }
+        let (words, count) = &mut self.file.unknown;
+        *count += 1;
+        if words.len() < MAX_UNKNOWN && words.iter().all(|(word, _)| word != key) {
+            self.unknown = Some(key.chars().take(40).collect());
         }
     }
 

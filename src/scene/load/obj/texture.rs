@@ -3,7 +3,10 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use super::mtl::Map;
+use glam::Vec3;
+
+use super::mtl::{Map, MapChannel};
+use crate::colour::srgb_encode;
 use crate::error::Error;
 use crate::scene::load::find::{self, Finder};
 use crate::scene::load::options::{ImagesDecoded, Loading};
@@ -22,11 +25,21 @@ enum Texels {
     /// A surface's roughness and metalness, with Blinn-Phong exponents in the first map: bits of
     /// the largest one.
     SurfaceOfExponents(u32),
+    /// Numbers of the first map, as grey.
+    Grey,
+    /// Numbers of the first map, as grey that is encoded as sRGB.
+    EncodedGrey,
+    /// Strengths of anisotropy of the first map, all along the tangent.
+    Anisotropy,
+    /// Normals of the heights of the first map.
+    Heights,
 }
 
-/// Identity of a texture: its texels, its files with the bits of their `-mm`, and whether it is
-/// clamped.
-type TextureKey = (Texels, [Option<(PathBuf, [u32; 2])>; 2], bool);
+/// Identity of a file of a texture: its path, the bits of its `-mm`, and its `-imfchan`.
+type FileKey = (PathBuf, [u32; 2], Option<MapChannel>);
+
+/// Identity of a texture: its texels, its files, and whether it is clamped.
+type TextureKey = (Texels, [Option<FileKey>; 2], bool);
 
 /// The pictures and textures of a model's materials.
 pub(super) struct Textures<'a> {
@@ -63,10 +76,11 @@ impl<'a> Textures<'a> {
                 picture.clone()
             }
             (color, alpha) => {
-                let channel = if alpha.is_some_and(|(_, picture)| has_alpha(picture)) { 3 } else { 0 };
+                let own = if alpha.is_some_and(|(_, p)| has_alpha(p)) { MapChannel::Alpha } else { MapChannel::Red };
+                let channel = alpha.and_then(|(map, _)| map.channel).unwrap_or(own);
                 combined([color, alpha].map(|p| p.map(|(_, picture)| picture)), |[c, a]| {
                     let [r, g, b, _] = c.zip(color).map_or([1.0; 4], |(texel, (map, _))| texel.map(|v| ranged(map, v)));
-                    [r, g, b, a.zip(alpha).map_or(1.0, |(texel, (map, _))| ranged(map, texel[channel]))]
+                    [r, g, b, a.zip(alpha).map_or(1.0, |(texel, (map, _))| ranged(map, channel.value(texel)))]
                 })
             }
         })
@@ -85,11 +99,69 @@ impl<'a> Textures<'a> {
         self.slot([rough, metal], texels, beside, scene, |[rough, metal]| {
             combined([rough, metal].map(|p| p.map(|(_, picture)| picture)), |[r, m]| {
                 let channel = |texel: Option<[f32; 4]>, p: Option<(&Map, &DecodedImage)>| {
-                    texel.zip(p).map_or(1.0, |(texel, (map, _))| ranged(map, texel[0]))
+                    texel.zip(p).map_or(1.0, |(texel, (map, _))| number(map, texel))
                 };
                 let rough = channel(r, rough);
                 let rough = shininess.filter(|_| r.is_some()).map_or(rough, |n| roughness(n * rough));
                 [1.0, rough, channel(m, metal), 1.0]
+            })
+        })
+    }
+
+    /// The texture of a map of numbers, as grey.
+    pub(super) fn grey(&mut self, map: Option<&Map>, beside: [&Path; 2], scene: &mut Scene) -> Option<TextureSlot> {
+        self.numbers(map, Texels::Grey, beside, scene, |x| [x, x, x, 1.0])
+    }
+
+    /// The texture of a map of numbers, as grey where textures of colours are read as sRGB.
+    pub(super) fn encoded_grey(
+        &mut self,
+        map: Option<&Map>,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+    ) -> Option<TextureSlot> {
+        self.slot([map, None], Texels::EncodedGrey, beside, scene, |[p, _]| {
+            // floats are linear, whatever they are of
+            let is_float = p.is_some_and(|(_, p)| matches!(p.texels, TexelData::Float(_)));
+            let encode = |x: f32| if is_float { x } else { srgb_encode(x.clamp(0.0, 1.0)) };
+            combined([p.map(|(_, p)| p), None], |[texel, _]| {
+                let x = p.zip(texel).map_or(1.0, |((map, _), texel)| encode(number(map, texel)));
+                [x, x, x, 1.0]
+            })
+        })
+    }
+
+    /// The texture of a map of strengths of anisotropy.
+    pub(super) fn anisotropy(
+        &mut self,
+        map: Option<&Map>,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+    ) -> Option<TextureSlot> {
+        self.numbers(map, Texels::Anisotropy, beside, scene, |x| [1.0, 0.5, x, 1.0])
+    }
+
+    /// The normal map of a map of heights, for a height of 1 that is as high as a texel is wide
+    /// ([`normals_of_heights`]).
+    pub(super) fn heights(&mut self, map: Option<&Map>, beside: [&Path; 2], scene: &mut Scene) -> Option<TextureSlot> {
+        self.slot([map, None], Texels::Heights, beside, scene, |[first, _]| match first {
+            Some((map, picture)) => normals_of_heights(map, picture),
+            None => combined([None, None], |_| [0.5, 0.5, 1.0, 1.0]),
+        })
+    }
+
+    /// The texture whose texels `texel` makes of a map's numbers.
+    fn numbers(
+        &mut self,
+        map: Option<&Map>,
+        texels: Texels,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+        texel: impl Fn(f32) -> [f32; 4],
+    ) -> Option<TextureSlot> {
+        self.slot([map, None], texels, beside, scene, |[p, _]| {
+            combined([p.map(|(_, p)| p), None], |[at, _]| {
+                texel(p.zip(at).map_or(1.0, |((map, _), at)| number(map, at)))
             })
         })
     }
@@ -105,7 +177,7 @@ impl<'a> Textures<'a> {
     ) -> Option<TextureSlot> {
         let options = maps[0].or(maps[1])?;
         let files = maps.map(|map| map.and_then(|map| Some((map, self.path(map, beside, &mut scene.report)?))));
-        let key = files.clone().map(|file| file.map(|(map, path)| (path, map.range.map(f32::to_bits))));
+        let key = files.clone().map(|file| file.map(|(map, path)| (path, map.range.map(f32::to_bits), map.channel)));
         let key = (texels, key, options.clamp);
         if let Some(&texture) = self.textures.get(&key) {
             return Some(TextureSlot { texture, texcoord: 0, transform: options.transform });
@@ -119,10 +191,10 @@ impl<'a> Textures<'a> {
         });
         let named = files.iter().zip(&pictures).find_map(|(file, picture)| file.as_ref().filter(|_| picture.is_some()));
         let name = named?.1.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // what two maps are combined to has a texel for each of the larger one
-        let texels =
-            pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
-        self.loading.budget.take(4 * texels, || format!("the texture {name}")).ok()?;
+        // what two maps are combined to has a texel for each of the larger one; normals have 16 bits
+        let bytes = if texels == Texels::Heights { 8 } else { 4 };
+        let count = pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
+        self.loading.budget.take(bytes * count, || format!("the texture {name}")).ok()?;
         let DecodedImage { width, height, texels } = make(pictures);
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
         let texture = scene.textures.len();
@@ -185,6 +257,44 @@ pub(super) fn roughness(shininess: f32) -> f32 {
 fn ranged(map: &Map, value: f32) -> f32 {
     let [base, gain] = map.range;
     if map.range == [0.0, 1.0] { value } else { (base + gain * value).clamp(0.0, 1.0) }
+}
+
+/// The number that a map has in a texel: in the channel of `-imfchan`, or else in red.
+fn number(map: &Map, texel: [f32; 4]) -> f32 {
+    ranged(map, map.channel.unwrap_or(MapChannel::Red).value(texel))
+}
+
+/// The tangent-space normal map of a map of heights, by central differences: a height of 1 is as
+/// high as a texel is wide. `-bm` is not in it: that is the scale of the normal map's x and y,
+/// which multiplies slopes. Differences go on at the other side where the map repeats; at the
+/// border of one that is clamped they are one-sided. It has 16 bits, for the slopes of 8-bit
+/// heights are smaller than the steps of an 8-bit normal map.
+fn normals_of_heights(map: &Map, picture: &DecodedImage) -> DecodedImage {
+    let (width, height) = (picture.width.max(1), picture.height.max(1));
+    // the format's channel of bumps is luminance
+    let channel = map.channel.unwrap_or(MapChannel::Luminance);
+    let at = |x: u32, y: u32| {
+        let texel = picture.texels.get((u64::from(y) * u64::from(width) + u64::from(x)) as usize);
+        ranged(map, channel.value(texel))
+    };
+    let neighbours = |i: u32, size: u32| {
+        if map.clamp { (i.saturating_sub(1), (i + 1).min(size - 1)) } else { ((i + size - 1) % size, (i + 1) % size) }
+    };
+    let slope = |before: f32, after: f32, is_one_sided: bool| (after - before) * if is_one_sided { 1.0 } else { 0.5 };
+    let mut texels: Vec<u16> = Vec::with_capacity(4 * width as usize * height as usize);
+    for y in 0..height {
+        let (above, below) = neighbours(y, height);
+        for x in 0..width {
+            let (left, right) = neighbours(x, width);
+            let along = slope(at(left, y), at(right, y), map.clamp && right - left == 1);
+            // the image's rows go down, and the bitangent up
+            let up = slope(at(x, below), at(x, above), map.clamp && below - above == 1);
+            let normal = Vec3::new(-along, -up, 1.0).normalize();
+            let encoded = (0.5 * normal + 0.5).to_array().map(|v| (65535.0 * v).round() as u16);
+            texels.extend(encoded.into_iter().chain([u16::MAX]));
+        }
+    }
+    DecodedImage { width, height, texels: texels.into() }
 }
 
 fn has_alpha(picture: &DecodedImage) -> bool {
