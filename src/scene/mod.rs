@@ -36,6 +36,7 @@ pub use orbit::Orbit;
 pub use settings::SceneSettings;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
@@ -125,6 +126,9 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Instances of meshes. Their indices are the instance ids in hits and images.
     pub instances: Vec<Instance>,
+    /// Instances that are not there until an animation shows them, as indices into
+    /// [`Scene::instances`].
+    pub hidden: BTreeSet<usize>,
     /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
     pub materials: Vec<Material>,
     /// Names of the variants of materials that a file has (KHR_materials_variants).

@@ -24,7 +24,8 @@ pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
     used.dedup();
-    let media: Vec<&Material> = used.into_iter().map(|m| &flat.scene.materials[m]).filter(|m| is_medium(m)).collect();
+    let media: Vec<&Material> =
+        used.into_iter().flat_map(|k| flat.motion.states(flat.scene, k)).filter(|m| is_medium(m)).collect();
     media.len() > 1 || media.iter().any(|m| absorbs(m))
 }
 
