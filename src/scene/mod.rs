@@ -172,6 +172,11 @@ impl Scene {
         self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
     }
 
+    /// The instances that are not hidden.
+    pub fn shown_instances(&self) -> impl Iterator<Item = &Instance> {
+        self.instances.iter().enumerate().filter(|(k, _)| !self.hidden.contains(k)).map(|(_, instance)| instance)
+    }
+
     /// Whether nothing in it emits light: it has no environment, no lights, and no surface that
     /// emits or shows its colour unlit.
     pub fn is_dark(&self) -> bool {
@@ -179,7 +184,7 @@ impl Scene {
             let material = &self.materials[self.meshes[i.mesh].material];
             material.unlit || material.emissive.max_element() > 0.0
         };
-        self.environment == Environment::Black && self.lights.is_empty() && !self.instances.iter().any(shines)
+        self.environment == Environment::Black && self.lights.is_empty() && !self.shown_instances().any(shines)
     }
 
     /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for

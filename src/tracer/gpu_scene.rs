@@ -260,9 +260,8 @@ impl GpuScene {
         for (k, material) in changed {
             let record = writer.textures.material(material, writer.blend);
             if let Some(place) = self.material_records.get_mut(*k).filter(|r| **r != record) {
-                // what is there depends on alpha, its cutoff, and where its texture lies
-                let is_tested = record.alpha_cutoff >= 0.0;
-                change = change.max(if is_tested { MaterialChange::Alpha } else { MaterialChange::Shading });
+                let is_there = record.alpha_cutoff < 0.0 || has_same_alpha(place, &record);
+                change = change.max(if is_there { MaterialChange::Shading } else { MaterialChange::Alpha });
                 *place = record;
             }
             let use_of = |slot| writer.textures.slot(slot);
@@ -325,6 +324,13 @@ impl GpuScene {
         self.root.top_level = address;
         write_all(&mut self.root_buffer, &[self.root])
     }
+}
+
+/// Whether two states of a material that is tested for alpha are there at the same places.
+fn has_same_alpha(a: &MaterialRecord, b: &MaterialRecord) -> bool {
+    a.base_color[3] == b.base_color[3]
+        && a.alpha_cutoff == b.alpha_cutoff
+        && (a.texcoord_transform, a.texcoord_offset) == (b.texcoord_transform, b.texcoord_offset)
 }
 
 /// The records of all submeshes, and the index of each group's first.

@@ -65,7 +65,7 @@ impl ClosedVolumes {
             }
             Some(VolumeMesh { material: mesh.material as u32, to_object: to_world.inverse(), triangles, spheres })
         };
-        Self(scene.instances.iter().filter_map(body).collect())
+        Self(scene.shown_instances().filter_map(body).collect())
     }
 
     /// The volumes that contain a point (relative to the scene's origin), innermost first, then

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ::gltf::json::accessor::Type;
 use ::gltf::json::{Index, Root};
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::accessor::Reader;
 use super::pointer::Pointer;
@@ -35,25 +36,14 @@ struct ChannelJson {
 struct TargetJson {
     node: Option<usize>,
     path: String,
-    extensions: TargetExtensions,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default)]
-struct TargetExtensions {
-    #[serde(rename = "KHR_animation_pointer")]
-    pointer: Option<PointerJson>,
-}
-
-#[derive(Deserialize)]
-struct PointerJson {
-    pointer: String,
+    extensions: Value,
 }
 
 impl TargetJson {
     /// The JSON pointer of KHR_animation_pointer.
     fn pointer(&self) -> Option<&str> {
-        self.extensions.pointer.as_ref().filter(|_| self.path == "pointer").map(|p| p.pointer.as_str())
+        let extension = self.extensions.get("KHR_animation_pointer").filter(|_| self.path == "pointer");
+        extension?.get("pointer")?.as_str()
     }
 
     /// The node and the path of a channel that transforms or morphs it, with a pointer or without.
