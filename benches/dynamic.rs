@@ -62,7 +62,7 @@ const TRIANGLES: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
 fn deform(bencher: Bencher, kind: TracerKind, n: usize, rebuild: bool) {
     let poses = [surface(n, 0.0).positions, surface(n, 0.1).positions];
     let scene = scene(surface(n, 0.0), 1);
-    let mut tracer = tracer(kind, &scene, Motion { instances: Vec::new(), meshes: vec![0] });
+    let mut tracer = tracer(kind, &scene, Motion { instances: Vec::new(), meshes: vec![0], ..Motion::default() });
     let mut turn = 0;
     bencher.counter(ItemsCount::new(n)).bench_local(|| {
         turn += 1;
@@ -107,7 +107,8 @@ const INSTANCES: [usize; 6] = [10, 100, 256, 1_000, 10_000, 100_000];
 /// All instances move a little; tracing is said to cost nothing, so a large top level is only refitted.
 fn place(bencher: Bencher, kind: TracerKind, n: usize) {
     let scene = scene(surface(8, 0.0), n);
-    let mut tracer = tracer(kind, &scene, Motion { instances: (0..n).collect(), meshes: Vec::new() });
+    let mut tracer =
+        tracer(kind, &scene, Motion { instances: (0..n).collect(), meshes: Vec::new(), ..Motion::default() });
     let poses = [0.0, 0.2].map(|by| {
         let moved = |(i, x): (usize, &Instance)| {
             (i, DAffine3::from_translation(DVec3::splat(by * (i % 7) as f64)) * x.object_to_world)

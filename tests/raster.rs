@@ -435,7 +435,11 @@ fn gpu_rasterized_scenes_follow_updates() {
     let Some(device) = device() else { return };
     for kind in picked(&device) {
         let mut scene = scene("grid:3");
-        let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![scene.instances[0].mesh] };
+        let motion = Motion {
+            instances: (0..scene.instances.len()).collect(),
+            meshes: vec![scene.instances[0].mesh],
+            ..Motion::default()
+        };
         let flat = FlatScene::with_motion(&scene, motion.clone()).unwrap();
         let mut tracer = Tracer::new(&device, kind, &flat, ALL).unwrap();
         let camera = scene.cameras[0].clone();
@@ -466,6 +470,7 @@ fn gpu_rasterized_scenes_follow_updates() {
                 .iter()
                 .map(|&mesh| MeshChange { mesh, positions: positions(mesh), normals: None })
                 .collect(),
+            ..Changes::default()
         };
         tracer.update(&changes).unwrap();
         let shot = Shot { scene: &scene, camera: &camera, size: SIZE };

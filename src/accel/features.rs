@@ -3,7 +3,7 @@
 
 use super::flatten::FlatScene;
 use crate::interface::ShadingFeatures;
-use crate::scene::{AlphaMode, Geometry, Material, Scene, TexelData};
+use crate::scene::{AlphaMode, Geometry, Material, Mesh, Motion, Scene, TexelData};
 
 /// Visibility class of a mesh by its alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,60 +39,67 @@ pub enum Blend {
 }
 
 /// Class of each mesh of the scene, from the range of alpha that its material and vertices can
-/// reach.
-pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
+/// reach; a mesh whose material changes between classes is tested.
+pub fn alpha_classes(scene: &Scene, motion: &Motion, blend: Blend) -> Vec<AlphaClass> {
     // range of alpha of each texture, computed once and only where an alpha mode needs it
     let mut ranges: Vec<Option<(f32, f32)>> = vec![None; scene.textures.len()];
-    scene
-        .meshes
-        .iter()
-        .map(|mesh| {
-            let material = &scene.materials[mesh.material];
-            let Some(cutoff) = alpha_cutoff(material) else { return AlphaClass::Opaque };
+    let class = |mesh: &Mesh| {
+        let mut classes = motion.states(scene, mesh.material).map(|m| alpha_class(scene, mesh, m, blend, &mut ranges));
+        let first = classes.next().unwrap_or(AlphaClass::Opaque);
+        if classes.all(|class| class == first) { first } else { AlphaClass::Tested }
+    };
+    scene.meshes.iter().map(class).collect()
+}
 
-            // the range that alpha has on the mesh: the factor by texture and vertex colours
-            let (mut lo, mut hi) = (material.base_color.w, material.base_color.w);
-            if let Geometry::Triangles(t) = &mesh.geometry {
-                if let Some(slot) = &material.base_color_texture {
-                    let (a, b) =
-                        *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].texels));
-                    (lo, hi) = (lo * a, hi * b);
-                }
-                if !t.colors.is_empty() {
-                    let (a, b) =
-                        t.colors.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), c| (a.min(c.w), b.max(c.w)));
-                    (lo, hi) = (lo * a, hi * b);
-                }
-            }
+/// Class of a mesh with this material. `ranges`: alpha of textures, as far as it is known.
+fn alpha_class(
+    scene: &Scene,
+    mesh: &Mesh,
+    material: &Material,
+    blend: Blend,
+    ranges: &mut [Option<(f32, f32)>],
+) -> AlphaClass {
+    let Some(cutoff) = alpha_cutoff(material) else { return AlphaClass::Opaque };
 
-            // interpolation rounds: a range that just reaches the cutoff is tested
-            let margin = 1e-5;
+    // the range that alpha has on the mesh: the factor by texture and vertex colours
+    let (mut lo, mut hi) = (material.base_color.w, material.base_color.w);
+    if let Geometry::Triangles(t) = &mesh.geometry {
+        if let Some(slot) = &material.base_color_texture {
+            let (a, b) = *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].texels));
+            (lo, hi) = (lo * a, hi * b);
+        }
+        if !t.colors.is_empty() {
+            let (a, b) = t.colors.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), c| (a.min(c.w), b.max(c.w)));
+            (lo, hi) = (lo * a, hi * b);
+        }
+    }
 
-            // stochastic alpha is opaque from 1 on, and absent at 0
-            let covered = blend == Blend::Stochastic && material.alpha_mode == AlphaMode::Blend;
-            if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
-                return match (lo >= 1.0 - margin, hi <= 0.0) {
-                    (true, _) => AlphaClass::Opaque,
-                    (_, true) => AlphaClass::Absent,
-                    _ => AlphaClass::Tested,
-                };
-            }
+    // interpolation rounds: a range that just reaches the cutoff is tested
+    let margin = 1e-5;
 
-            // a mask compares with the cutoff
-            if lo >= cutoff + margin || cutoff <= 0.0 {
-                AlphaClass::Opaque
-            } else if hi < cutoff - margin {
-                AlphaClass::Absent
-            } else if matches!(mesh.geometry, Geometry::Spheres(_)) {
-                // spheres have no texture coordinates: their alpha is constant
-                if lo >= cutoff { AlphaClass::Opaque } else { AlphaClass::Absent }
-            } else if lo == hi && lo >= cutoff {
-                AlphaClass::Opaque
-            } else {
-                AlphaClass::Tested
-            }
-        })
-        .collect()
+    // stochastic alpha is opaque from 1 on, and absent at 0
+    let covered = blend == Blend::Stochastic && material.alpha_mode == AlphaMode::Blend;
+    if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
+        return match (lo >= 1.0 - margin, hi <= 0.0) {
+            (true, _) => AlphaClass::Opaque,
+            (_, true) => AlphaClass::Absent,
+            _ => AlphaClass::Tested,
+        };
+    }
+
+    // a mask compares with the cutoff
+    if lo >= cutoff + margin || cutoff <= 0.0 {
+        AlphaClass::Opaque
+    } else if hi < cutoff - margin {
+        AlphaClass::Absent
+    } else if matches!(mesh.geometry, Geometry::Spheres(_)) {
+        // spheres have no texture coordinates: their alpha is constant
+        if lo >= cutoff { AlphaClass::Opaque } else { AlphaClass::Absent }
+    } else if lo == hi && lo >= cutoff {
+        AlphaClass::Opaque
+    } else {
+        AlphaClass::Tested
+    }
 }
 
 fn alpha_range(texels: &TexelData) -> (f32, f32) {

@@ -65,6 +65,8 @@ pub struct TlasInstance {
     pub to_world: DAffine3,
     /// Index into [`Scene::instances`]; `None` for a baked group, whose submeshes name theirs.
     pub scene_instance: Option<usize>,
+    /// Rays miss it, until an animation shows it.
+    pub hidden: bool,
 }
 
 /// A scene arranged for building acceleration structures.
@@ -119,7 +121,7 @@ impl<'a> FlatScene<'a> {
 
     fn group(scene: &'a Scene, motion: Motion, blend: Blend) -> Self {
         let origin = scene.origin();
-        let alpha = alpha_classes(scene, blend);
+        let alpha = alpha_classes(scene, &motion, blend);
 
         // a mesh that is used once and never changes can be baked into world space
         let mut uses = vec![0usize; scene.meshes.len()];
@@ -146,6 +148,11 @@ impl<'a> FlatScene<'a> {
                 if (class == AlphaClass::Tested) != tested || geometry.primitive_count() == 0 {
                     continue;
                 }
+                // what is hidden and stays so is not there
+                let hidden = flat.scene.hidden.contains(&k);
+                if hidden && !flat.motion.instances.contains(&k) {
+                    continue;
+                }
                 if class == AlphaClass::Absent {
                     flat.absent_primitives += geometry.primitive_count();
                     continue;
@@ -164,7 +171,7 @@ impl<'a> FlatScene<'a> {
                         flat.groups.push(g);
                         flat.groups.len() - 1
                     });
-                    flat.instances.push(TlasInstance { group, to_world, scene_instance: Some(k) });
+                    flat.instances.push(TlasInstance { group, to_world, scene_instance: Some(k), hidden });
                 }
             }
         }
@@ -175,6 +182,7 @@ impl<'a> FlatScene<'a> {
                 group: flat.groups.len(),
                 to_world: DAffine3::IDENTITY,
                 scene_instance: None,
+                hidden: false,
             });
             flat.groups.push(group);
         }

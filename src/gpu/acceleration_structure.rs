@@ -47,6 +47,8 @@ pub struct AccelerationStructureInstance {
     pub hit_group: u32,
     /// Device address of its bottom-level structure ([`AccelerationStructure::address`]).
     pub bottom_level: u64,
+    /// Rays miss it.
+    pub hidden: bool,
 }
 
 /// How a structure is updated after its inputs have changed in place.
@@ -255,7 +257,8 @@ fn entry_records(device: &Arc<Device>, entries: &[AccelerationStructureInstance]
     for (entry, record) in entries.iter().zip(bytes.chunks_exact_mut(64)) {
         // VkAccelerationStructureInstanceKHR: transform, index | mask, hit group | flags, address
         record[..48].copy_from_slice(bytemuck::cast_slice(&entry.transform));
-        record[48..52].copy_from_slice(&(entry.index | 0xff << 24).to_le_bytes());
+        let mask: u32 = if entry.hidden { 0 } else { 0xff };
+        record[48..52].copy_from_slice(&(entry.index | mask << 24).to_le_bytes());
         let cull_disable = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
         record[52..56].copy_from_slice(&(entry.hit_group | cull_disable << 24).to_le_bytes());
         record[56..].copy_from_slice(&entry.bottom_level.to_le_bytes());

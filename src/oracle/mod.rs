@@ -149,7 +149,9 @@ impl Oracle {
                 condition: if condition.is_finite() { condition.max(1.0) } else { f64::INFINITY },
                 translation: to_world.translation.length(),
             };
-            match scene.meshes.get(instance.mesh).map(|m| &m.geometry) {
+            // nothing is hit of a hidden one
+            let shown = scene.meshes.get(instance.mesh).filter(|_| !scene.hidden.contains(&(id as usize)));
+            match shown.map(|m| &m.geometry) {
                 Some(Geometry::Triangles(mesh)) => {
                     let points: Vec<_> =
                         mesh.positions.iter().map(|p| to_world.transform_point3(p.as_dvec3())).collect();

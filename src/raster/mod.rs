@@ -212,6 +212,9 @@ impl Raster {
         let (mut draws, mut stats) = (Draws::default(), DrawStats::default());
         let mut depth = [f64::INFINITY, 0.0f64];
         for entry in tracer.raster_instances() {
+            if entry.hidden {
+                continue;
+            }
             stats.placed += entry.shape.primitives as u64;
             let overlap = frustum.classify(&entry.shape.bounds, &entry.to_world);
             if overlap == FrustumTest::Outside {

@@ -40,7 +40,7 @@ use crate::gpu::{Buffer, Timing};
 use crate::integrators::path::PathOptions;
 use crate::scene::Scene;
 use crate::shaders::StreamShaders;
-use crate::tracer::{MovedBounds, Tracer};
+use crate::tracer::{MaterialChange, MovedBounds, Tracer};
 use camera_change::between;
 pub(super) use camera_change::inverse;
 use display::{Display, DisplayMode};
@@ -208,6 +208,16 @@ impl Realtime {
     pub fn change_light(&mut self) {
         if self.signal.depends_on_light() {
             self.history.change_light();
+        }
+    }
+
+    /// Notes what of materials has changed ([`crate::tracer::UpdateStats::materials`]): where
+    /// surfaces are that are partly transparent, histories are discarded.
+    pub fn change_materials(&mut self, change: MaterialChange) {
+        match change {
+            MaterialChange::None => (),
+            MaterialChange::Shading => self.change_light(),
+            MaterialChange::Alpha => self.start_at(self.history.frame),
         }
     }
 

@@ -79,7 +79,7 @@ pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
     })
 }
 
-/// Returns true if an animation moves lights, or surfaces that emit light.
+/// Returns true if an animation moves or changes lights, or surfaces that emit light.
 ///
 /// # Errors
 /// [`Error::Usage`] when the scene has no such animation.
@@ -90,7 +90,7 @@ pub fn moves_lights(scene: &Scene, rig: &AnimationRig, animation: usize) -> Resu
         scene.materials.get(scene.meshes[mesh].material).is_some_and(|m| m.emissive != Vec3::ZERO && !m.unlit)
     };
     let moves_emitter = scene.instances.iter().enumerate().any(|(k, i)| moves(k, i.mesh) && emits(i.mesh));
-    Ok(moves_emitter || !rig.moving_lights(animation)?.is_empty())
+    Ok(moves_emitter || !rig.moving_lights(animation)?.is_empty() || rig.changes_light(animation)?)
 }
 
 impl<'a> FrameSequence<'a> {
@@ -150,9 +150,11 @@ impl<'a> FrameSequence<'a> {
             if let Some(&(_, camera_to_world)) = posed {
                 camera.camera_to_world = camera_to_world;
             }
+            p.pose.set_lens(self.file_camera, &mut camera);
             if tracer.is_dynamic() {
                 stats = tracer.update(&p.pose.changes())?;
             }
+            stats.materials = tracer.set_materials(&p.pose.materials)?;
             if let Some(posed) = &mut p.posed {
                 p.pose.apply(Arc::make_mut(posed));
             }

@@ -254,6 +254,7 @@ impl Frames<'_> {
         if self.sequence.has_cut() {
             self.realtime.rewind();
         }
+        self.realtime.change_materials(update.materials);
         if let Some(posed) = self.sequence.posed_lights() {
             self.realtime.move_lights(&self.tracer, posed)?;
         }

@@ -159,12 +159,14 @@ impl StillSequence<'_> {
             };
             rest.rig.as_ref().ok_or_else(none)?.pose(*index, seconds, end, pose)?;
             pose.apply(&mut self.renderer.scene);
-            if !pose.instances.is_empty() || !pose.meshes.is_empty() {
+            let moves = !pose.instances.is_empty() || !pose.meshes.is_empty();
+            if moves || !pose.materials.is_empty() || !pose.hidden.is_empty() {
                 self.renderer.tracer = None;
             }
             if let Some(&(_, to_world)) = pose.cameras.iter().find(|(k, _)| Some(*k) == self.file_camera) {
                 camera.camera_to_world = to_world;
             }
+            pose.set_lens(self.file_camera, &mut camera);
         }
         Ok(self.motion.camera_at(camera, frame))
     }

@@ -58,6 +58,9 @@ pub fn of_scene(scene: &Scene) -> String {
     // the debug text has all fields, and all digits of numbers
     hash.text(&scene.materials);
     hash.text(&scene.lights);
+    if !scene.hidden.is_empty() {
+        hash.text(&scene.hidden);
+    }
     // they decide where light is sampled
     hash.text(&scene.portals);
     hash.finish()

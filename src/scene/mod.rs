@@ -36,6 +36,7 @@ pub use orbit::Orbit;
 pub use settings::SceneSettings;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
@@ -137,6 +138,9 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Instances of meshes. Their indices are the instance ids in hits and images.
     pub instances: Vec<Instance>,
+    /// Instances that are not there until an animation shows them, as indices into
+    /// [`Scene::instances`].
+    pub hidden: BTreeSet<usize>,
     /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
     pub materials: Vec<Material>,
     /// Names of the variants of materials that a file has (KHR_materials_variants).
@@ -180,6 +184,11 @@ impl Scene {
         self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
     }
 
+    /// The instances that are not hidden.
+    pub fn shown_instances(&self) -> impl Iterator<Item = &Instance> {
+        self.instances.iter().enumerate().filter(|(k, _)| !self.hidden.contains(k)).map(|(_, instance)| instance)
+    }
+
     /// Whether nothing in it emits light: it has no environment, no lights, and no surface that
     /// emits or shows its colour unlit.
     pub fn is_dark(&self) -> bool {
@@ -187,7 +196,7 @@ impl Scene {
             let material = &self.materials[self.meshes[i.mesh].material];
             material.unlit || material.emissive.max_element() > 0.0
         };
-        self.environment == Environment::Black && self.lights.is_empty() && !self.instances.iter().any(shines)
+        self.environment == Environment::Black && self.lights.is_empty() && !self.shown_instances().any(shines)
     }
 
     /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for

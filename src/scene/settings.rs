@@ -65,6 +65,9 @@ impl SceneSettings {
             has_changed |= scene.materials[i] != copy;
             scene.materials[i] = copy;
         }
+        if let Some(rig) = &mut scene.rig {
+            rig.set_variant(variant);
+        }
         Ok(has_changed)
     }
 }

@@ -12,12 +12,12 @@ use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::transform::{rows, transformed_bounds};
-use super::{Structure, Tracer};
+use super::{MaterialChange, Structure, Tracer};
 use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
-use crate::scene::Geometry;
 use crate::scene::animation::{Pose, PosedMesh};
+use crate::scene::{Geometry, Material};
 
 /// New vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +39,8 @@ pub struct Changes<'a> {
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that have deformed.
     pub meshes: Vec<MeshChange<'a>>,
+    /// Instances that are hidden from now on, or no longer.
+    pub hidden: Vec<(usize, bool)>,
 }
 
 /// Bounds of an instance that moved or deformed in an update.
@@ -61,7 +63,11 @@ impl Pose {
             let normals = Some(&shape.normals[..]).filter(|n| !n.is_empty());
             MeshChange { mesh: posed.mesh, positions: &shape.positions, normals }
         }
-        Changes { instances: self.instances.clone(), meshes: self.meshes.iter().map(mesh).collect() }
+        Changes {
+            instances: self.instances.clone(),
+            meshes: self.meshes.iter().map(mesh).collect(),
+            hidden: self.hidden.clone(),
+        }
     }
 }
 
@@ -83,6 +89,9 @@ pub struct UpdateStats {
     /// Bounds of what moved or deformed.
     #[serde(skip)]
     pub moved: Vec<MovedBounds>,
+    /// What of materials changed.
+    #[serde(skip)]
+    pub materials: MaterialChange,
 }
 
 /// A mesh that may deform.
@@ -173,7 +182,24 @@ impl Dynamic {
             }
             moved.extend(entry.map(|e| (e, to_world)));
         }
+        if let Some((i, _)) = changes.hidden.iter().find(|(i, _)| !self.entries.contains_key(i)) {
+            return Err(Error::Usage(format!(
+                "instance {i} was not declared as one that may be hidden: list it in Motion::instances"
+            )));
+        }
         Ok(moved)
+    }
+
+    /// Hides and shows instances; returns the TLAS instances that were the other before.
+    fn switch(&mut self, changes: &Changes) -> Vec<usize> {
+        let mut switched = Vec::new();
+        for (i, hidden) in &changes.hidden {
+            let Some(entry) = self.entries.get(i).copied().flatten() else { continue };
+            if std::mem::replace(&mut self.instances[entry].hidden, *hidden) != *hidden {
+                switched.push(entry);
+            }
+        }
+        switched
     }
 }
 
@@ -193,7 +219,7 @@ fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
 impl Dynamic {
     /// Applies the changes to the host-side state and returns the bounds of what moved. Instances
     /// whose transform and vertices are unchanged are left out.
-    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<MovedBounds> {
+    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)], switched: &[usize]) -> Vec<MovedBounds> {
         // bounds before the update and largest displacement of the deformed groups, in group space
         let mut ways: HashMap<usize, (Aabb, f32)> = HashMap::new();
         for change in &changes.meshes {
@@ -218,7 +244,8 @@ impl Dynamic {
         for (k, p) in self.instances.iter_mut().enumerate() {
             let (old, new) = (p.to_world, latest.get(&k).copied().unwrap_or(p.to_world));
             let deformed = ways.get(&p.group).copied();
-            if old == new && deformed.is_none() {
+            let switches = switched.contains(&k);
+            if old == new && deformed.is_none() && !switches {
                 continue;
             }
             p.to_world = new;
@@ -229,7 +256,9 @@ impl Dynamic {
             let carried =
                 corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
             let half = 0.5 * (to.max - to.min).length().max(f32::MIN_POSITIVE);
-            out.push(MovedBounds { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
+            // nothing is where it was before
+            let share = if switches { 1.0 } else { (f64::from(way) * scale + carried) as f32 / half };
+            out.push(MovedBounds { bounds: from.union(to), share });
         }
         out
     }
@@ -261,7 +290,8 @@ impl Tracer {
         let start = Instant::now();
         let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
         self.scene.begin_update(&dynamic.instances, moved.iter().map(|m| m.0).collect(), deforming)?;
-        stats.moved = dynamic.advance(changes, &moved);
+        let switched = dynamic.switch(changes);
+        stats.moved = dynamic.advance(changes, &moved, &switched);
 
         // vertices, then the trees over them: refitted, or built anew
         let mut deformed = false;
@@ -284,11 +314,12 @@ impl Tracer {
         stats.mesh_seconds = start.elapsed().as_secs_f64();
 
         // the top level, above what has changed
-        if !deformed && moved.is_empty() {
+        if !deformed && moved.is_empty() && switched.is_empty() {
             return Ok(stats);
         }
         let start = Instant::now();
-        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.instances[m.0].to_world)).collect();
+        let entries = moved.iter().map(|m| m.0).chain(switched);
+        let latest: Vec<_> = entries.map(|k| (k, dynamic.instances[k].clone())).collect();
         self.scene.set_transforms(&latest)?;
         match &mut self.structure {
             Structure::Compute(h) => {
@@ -302,6 +333,16 @@ impl Tracer {
         }
         stats.top_seconds = start.elapsed().as_secs_f64();
         Ok(stats)
+    }
+
+    /// Changes materials, as indices into [`crate::scene::Scene::materials`]: those that were
+    /// declared in [`crate::scene::Motion`]. Returns what of them has changed since they were set
+    /// before.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn set_materials(&mut self, changed: &[(usize, Material)]) -> Result<MaterialChange> {
+        if changed.is_empty() { Ok(MaterialChange::None) } else { self.scene.set_materials(changed) }
     }
 
     /// Reports the device time of tracing since the last update, in seconds, from which the next

@@ -14,7 +14,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::{padding, reach_padding};
-use super::transform::{instance_padding, rows, transformed_bounds};
+use super::transform::{instance_padding, transformed_bounds, world_to_group};
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::{FlatScene, TlasInstance};
@@ -351,7 +351,7 @@ impl Tree {
 
 /// The top-level leaf of an instance, whose group has its root at block `root`.
 pub(super) fn instance_leaf(entry: u32, instance: &TlasInstance, root: u32) -> InstanceLeaf {
-    InstanceLeaf { world_to_group: rows(&instance.to_world.inverse()), root, instance: entry, ..Default::default() }
+    InstanceLeaf { world_to_group: world_to_group(instance), root, instance: entry, ..Default::default() }
 }
 
 /// Updates the corners of a leaf to the current vertices and returns their bounds. The vertex of

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, Vec3};
+use glam::Vec3;
 
 use super::albedo;
 use super::attributes::{Attribute, Attributes};
@@ -12,15 +12,18 @@ use super::needs::Needs;
 use super::previous_frame::PreviousFrame;
 use super::raster_instance::{RasterGeometry, RasterInstance};
 use super::shading;
-use super::textures::Textures;
-use super::transform::rows;
+use super::textures::{TextureSlots, Textures};
+use super::transform::{rows, world_to_group};
 use super::upload::write_all;
+use crate::accel::features::Blend;
 use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device};
 use crate::interface::records::ray::INVALID;
-use crate::interface::records::scene::{InstanceRecord, SceneRoot, SubmeshRecord};
+use crate::interface::records::scene::{InstanceRecord, MaterialRecord, SceneRoot, SubmeshRecord};
+use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures};
+use crate::scene::Material;
 
 /// Number and size of mip levels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,6 +32,35 @@ pub(super) struct MipStats {
     pub levels: u32,
     /// Size of levels 1 and up, in bytes.
     pub bytes: u64,
+}
+
+/// What a change of materials is about, the least first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MaterialChange {
+    /// Nothing has changed.
+    #[default]
+    None,
+    /// How surfaces look has changed.
+    Shading,
+    /// Where surfaces are has changed, too: their alpha is tested.
+    Alpha,
+}
+
+/// Writes the records of materials that change.
+struct MaterialWriter {
+    textures: TextureSlots,
+    needs: Needs,
+    /// Those of [`shading::indices_of_refraction`].
+    indices: Vec<f32>,
+    blend: Blend,
+}
+
+impl MaterialWriter {
+    /// `None` where no material changes.
+    fn new(textures: &Textures, needs: Needs, indices: &[f32], flat: &FlatScene) -> Option<Self> {
+        let make = || Self { textures: textures.slots.clone(), needs, indices: indices.to_vec(), blend: flat.blend };
+        (!flat.motion.materials.is_empty()).then(make)
+    }
 }
 
 /// A scene in device memory, without its acceleration structures.
@@ -46,6 +78,15 @@ pub struct GpuScene {
     normals: Vec<(usize, u64)>,
     /// State before the last update; `None` for a static scene.
     motion: Option<PreviousFrame>,
+    /// Whether rays miss each TLAS instance.
+    hidden: Vec<bool>,
+    material_records: Vec<MaterialRecord>,
+    material_buffer: Buffer,
+    /// Empty for tracers that do not shade, as is their buffer.
+    shading_records: Vec<ShadingRecord>,
+    shading_buffer: Option<Buffer>,
+    /// `None` where no material changes.
+    changing: Option<MaterialWriter>,
     others: Vec<Buffer>,
     mips: MipStats,
 }
@@ -70,10 +111,10 @@ impl GpuScene {
 
         // materials and their textures
         let textures = Textures::upload(device, flat, needs)?;
-        let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.material(m, flat.blend)).collect();
-        let indices = shading::indices_of_refraction(&flat.scene.materials);
+        let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.slots.material(m, flat.blend)).collect();
+        let indices = shading::indices_of_refraction(flat);
         let shading: Vec<_> = if needs.shading {
-            let record = |m| shading::record(m, needs, &indices, |slot| textures.slot(slot));
+            let record = |m| shading::record(m, needs, &indices, |slot| textures.slots.slot(slot));
             flat.scene.materials.iter().map(record).collect()
         } else {
             Vec::new()
@@ -87,13 +128,19 @@ impl GpuScene {
             others.push(buffer);
             address
         };
-        let mut root = SceneRoot { instances: instance_buffer.address(), ..Default::default() };
+        let material_buffer = Buffer::from_slice(device, "material records", &materials)?;
+        let mut root = SceneRoot {
+            instances: instance_buffer.address(),
+            materials: material_buffer.address(),
+            ..Default::default()
+        };
         root.submesh_count = submeshes.len() as u32;
         root.submeshes = keep(Buffer::from_slice(device, "submesh records", &submeshes)?);
         root.scene_instances = keep(Buffer::from_slice(device, "records of scene instances", &scene_instances)?);
-        root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
+        let changing = MaterialWriter::new(&textures, needs, &indices, flat);
         keep(textures.texels);
+        let mut shading_buffer = None;
         let mut mip_stats = MipStats::default();
         if let Some(mips) = textures.mips {
             let records = Buffer::from_slice(device, "mip records", &mips.records)?;
@@ -103,7 +150,9 @@ impl GpuScene {
             keep(mips.texels);
         }
         if needs.shading {
-            root.shading = keep(Buffer::from_slice(device, "shading records", &shading)?);
+            let buffer = Buffer::from_slice(device, "shading records", &shading)?;
+            root.shading = buffer.address();
+            shading_buffer = Some(buffer);
             if let Some(tables) = albedo_tables(flat, needs, &indices) {
                 root.albedo = keep(Buffer::from_slice(device, "albedo tables", &tables)?);
             }
@@ -131,6 +180,12 @@ impl GpuScene {
             attributes,
             normals,
             motion,
+            hidden: flat.instances.iter().map(|p| p.hidden).collect(),
+            material_records: materials,
+            material_buffer,
+            shading_records: shading,
+            shading_buffer,
+            changing,
             others,
             mips: mip_stats,
         })
@@ -139,9 +194,11 @@ impl GpuScene {
     /// The TLAS instances for rasterization, in their current state.
     pub(super) fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
         (0..).zip(self.instances.iter().zip(&self.group_of)).map(|(entry, (instance, &group))| {
+            let hidden = self.hidden[entry as usize];
             let buffers = &self.groups[group as usize];
             RasterInstance {
                 entry,
+                hidden,
                 to_world: instance.group_to_world,
                 shape: &self.shapes[group as usize],
                 positions: buffers.positions.address(),
@@ -157,7 +214,8 @@ impl GpuScene {
 
     /// Size in device memory, in bytes.
     pub fn bytes(&self) -> u64 {
-        let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
+        let own = [&self.attributes, &self.instance_buffer, &self.material_buffer];
+        let others = self.others.iter().chain(own).chain(&self.shading_buffer);
         self.groups.iter().map(GroupBuffers::bytes).chain(others.map(Buffer::size)).sum()
     }
 
@@ -195,11 +253,41 @@ impl GpuScene {
         }
     }
 
-    /// TLAS instances have moved: which, and where to.
-    pub(super) fn set_transforms(&mut self, moved: &[(usize, DAffine3)]) -> Result<()> {
-        for (k, to_world) in moved {
+    /// Materials have changed. Returns what has, by their records.
+    pub(super) fn set_materials(&mut self, changed: &[(usize, Material)]) -> Result<MaterialChange> {
+        let Some(writer) = &self.changing else { return Ok(MaterialChange::None) };
+        let mut change = MaterialChange::None;
+        for (k, material) in changed {
+            let record = writer.textures.material(material, writer.blend);
+            if let Some(place) = self.material_records.get_mut(*k).filter(|r| **r != record) {
+                let is_there = record.alpha_cutoff < 0.0 || has_same_alpha(place, &record);
+                change = change.max(if is_there { MaterialChange::Shading } else { MaterialChange::Alpha });
+                *place = record;
+            }
+            let use_of = |slot| writer.textures.slot(slot);
+            let record = shading::record(material, writer.needs, &writer.indices, use_of);
+            if let Some(place) = self.shading_records.get_mut(*k)
+                && bytemuck::bytes_of(place) != bytemuck::bytes_of(&record)
+            {
+                change = change.max(MaterialChange::Shading);
+                *place = record;
+            }
+        }
+        if change != MaterialChange::None {
+            write_all(&mut self.material_buffer, &self.material_records)?;
+            if let Some(buffer) = &mut self.shading_buffer {
+                write_all(buffer, &self.shading_records)?;
+            }
+        }
+        Ok(change)
+    }
+
+    /// TLAS instances have moved, or were hidden or shown: which, and how they are.
+    pub(super) fn set_transforms(&mut self, moved: &[(usize, TlasInstance)]) -> Result<()> {
+        for (k, instance) in moved {
             let record = &mut self.instances[*k];
-            (record.group_to_world, record.world_to_group) = (rows(to_world), rows(&to_world.inverse()));
+            (record.group_to_world, record.world_to_group) = (rows(&instance.to_world), world_to_group(instance));
+            self.hidden[*k] = instance.hidden;
         }
         // one piece: copying what lies between costs less than a call each
         let (first, last) = moved.iter().fold((usize::MAX, 0), |(a, b), m| (a.min(m.0), b.max(m.0)));
@@ -236,6 +324,13 @@ impl GpuScene {
         self.root.top_level = address;
         write_all(&mut self.root_buffer, &[self.root])
     }
+}
+
+/// Whether two states of a material that is tested for alpha are there at the same places.
+fn has_same_alpha(a: &MaterialRecord, b: &MaterialRecord) -> bool {
+    a.base_color[3] == b.base_color[3]
+        && a.alpha_cutoff == b.alpha_cutoff
+        && (a.texcoord_transform, a.texcoord_offset) == (b.texcoord_transform, b.texcoord_offset)
 }
 
 /// The records of all submeshes, and the index of each group's first.
@@ -277,7 +372,7 @@ fn instance_records(flat: &FlatScene, groups: &[GroupBuffers], first_submesh: &[
         .iter()
         .map(|p| InstanceRecord {
             group_to_world: rows(&p.to_world),
-            world_to_group: rows(&p.to_world.inverse()),
+            world_to_group: world_to_group(p),
             submesh_of: groups[p.group].submesh_of.as_ref().map_or(0, Buffer::address),
             first_submesh: first_submesh[p.group],
             scene_instance: p.scene_instance.map_or(INVALID, |i| i as u32),

@@ -4,13 +4,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DAffine3;
-
 use super::gpu_scene::GpuScene;
 use super::group_buffers::GroupBuffers;
 use super::transform::rows;
 use crate::accel::RefitPolicy;
-use crate::accel::flatten::{BlasGroup, FlatScene};
+use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{
     AccelerationStructure, AccelerationStructureInstance, BottomLevelInput, Buffer, Commands, Device, Memory, Update,
@@ -127,6 +125,7 @@ impl Structures {
                     index: k as u32,
                     hit_group,
                     bottom_level: bottom[p.group].address(),
+                    hidden: p.hidden,
                 }
             })
             .collect();
@@ -153,11 +152,14 @@ impl Structures {
         Ok(rebuild)
     }
 
-    /// Rebuilds the top level in place, after instances have moved or groups have deformed.
-    pub fn place(&mut self, device: &Arc<Device>, moved: &[(usize, DAffine3)]) -> Result<()> {
+    /// Rebuilds the top level in place, after instances have moved, were hidden or shown, or groups
+    /// have deformed.
+    pub fn place(&mut self, device: &Arc<Device>, moved: &[(usize, TlasInstance)]) -> Result<()> {
         let Some(changing) = &mut self.changing else { return Ok(()) };
-        for (entry, to_world) in moved {
-            changing.entries[*entry].transform.copy_from_slice(rows(to_world).as_flattened());
+        for (entry, instance) in moved {
+            let entry = &mut changing.entries[*entry];
+            entry.transform.copy_from_slice(rows(&instance.to_world).as_flattened());
+            entry.hidden = instance.hidden;
         }
         self.top.rebuild_top_level(&mut Commands::new(device)?, &changing.entries)
     }

@@ -41,6 +41,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
+pub use gpu_scene::MaterialChange;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
 pub use needs::Needs;

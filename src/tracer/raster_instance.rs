@@ -29,6 +29,8 @@ pub struct RasterGeometry {
 pub struct RasterInstance<'a> {
     /// Index of the TLAS instance.
     pub entry: u32,
+    /// Nothing of it is to be seen.
+    pub hidden: bool,
     /// Group space to world relative to the scene's origin: three rows.
     pub to_world: [[f32; 4]; 3],
     /// Geometry of the instance.

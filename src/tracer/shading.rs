@@ -204,8 +204,9 @@ fn absorption(m: &Material) -> [f32; 3] {
 
 /// The distinct indices of refraction of all refracting materials: each has an albedo table
 /// ([`super::albedo`]).
-pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
-    let mut all: Vec<f32> = materials.iter().filter(|m| refracts(m)).map(|m| m.ior).collect();
+pub(super) fn indices_of_refraction(flat: &FlatScene) -> Vec<f32> {
+    let states = (0..flat.scene.materials.len()).flat_map(|k| flat.motion.states(flat.scene, k));
+    let mut all: Vec<f32> = states.filter(|m| refracts(m)).map(|m| m.ior).collect();
     all.sort_by(f32::total_cmp);
     all.dedup();
     all
@@ -228,48 +229,56 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     // features that some visible surface uses
     for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
         let mesh = &flat.scene.meshes[part.mesh];
-        let m = &flat.scene.materials[mesh.material];
         let has_normals = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.normals.is_empty());
         materials.insert_if(has_normals, MaterialFeature::ShadingNormals);
         if needs.white {
             continue;
         }
-        let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;
-        match model(m) {
-            Some(model) => bsdfs.insert(model),
-            None => materials.insert(MaterialFeature::Unlit),
-        }
+        for m in flat.motion.states(flat.scene, mesh.material) {
+            let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;
+            match model(m) {
+                Some(model) => bsdfs.insert(model),
+                None => materials.insert(MaterialFeature::Unlit),
+            }
 
-        // a feature is compiled in only if a material needs it
-        let normal_maps =
-            m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
-        let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
-        let has_colors = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty());
-        let varies = has_colors || m.base_color_texture.is_some();
-        for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
-            textures.insert_if(slot.is_some(), feature);
-        }
-        for (required, feature) in [
-            (gltf && m.clearcoat.factor > 0.0, MaterialFeature::Clearcoat),
-            (gltf && m.sheen.color.max_element() > 0.0, MaterialFeature::Sheen),
-            (walls(m) == TransmissionMode::Thin, MaterialFeature::ThinWalls),
-            (walls(m) == TransmissionMode::Volume, MaterialFeature::Volumes),
-            (absorbs(m), MaterialFeature::Absorption),
-            (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
-            (gltf && m.iridescence.factor > 0.0, MaterialFeature::Iridescence),
-            (gltf && m.diffuse_transmission.factor > 0.0, MaterialFeature::DiffuseTransmission),
-            (gltf && m.retroreflection.factor > 0.0, MaterialFeature::Retroreflection),
-            (disperses(m), MaterialFeature::Dispersion),
-            (scatters(m), MaterialFeature::Scattering),
-            (normal_maps, MaterialFeature::ShadingNormals),
-            (separate, MaterialFeature::SeparateTangents),
-            (varies, MaterialFeature::BaseColors),
-            (m.emissive.max_element() > 0.0 && !m.unlit, MaterialFeature::Emission),
-        ] {
-            materials.insert_if(required, feature);
+            // a feature is compiled in only if a material needs it
+            let normal_maps =
+                m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
+            let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
+            let has_colors = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty());
+            let varies = has_colors || m.base_color_texture.is_some();
+            for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
+                textures.insert_if(slot.is_some(), feature);
+            }
+            for (required, feature) in [
+                (gltf && m.clearcoat.factor > 0.0, MaterialFeature::Clearcoat),
+                (gltf && m.sheen.color.max_element() > 0.0, MaterialFeature::Sheen),
+                (walls(m) == TransmissionMode::Thin, MaterialFeature::ThinWalls),
+                (walls(m) == TransmissionMode::Volume, MaterialFeature::Volumes),
+                (absorbs(m), MaterialFeature::Absorption),
+                (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
+                (gltf && m.iridescence.factor > 0.0, MaterialFeature::Iridescence),
+                (gltf && m.diffuse_transmission.factor > 0.0, MaterialFeature::DiffuseTransmission),
+                (gltf && m.retroreflection.factor > 0.0, MaterialFeature::Retroreflection),
+                (disperses(m), MaterialFeature::Dispersion),
+                (scatters(m), MaterialFeature::Scattering),
+                (normal_maps, MaterialFeature::ShadingNormals),
+                (separate, MaterialFeature::SeparateTangents),
+                (varies, MaterialFeature::BaseColors),
+                (m.emissive.max_element() > 0.0 && !m.unlit, MaterialFeature::Emission),
+            ] {
+                materials.insert_if(required, feature);
+            }
         }
     }
     ShadingFeatures { bsdfs, materials, textures }
+}
+
+/// Position of the index of refraction that is nearest to one: between keys of an animation there
+/// is no table of its own.
+fn nearest(indices: &[f32], ior: f32) -> u32 {
+    let distance = |k: &usize| (indices[*k] - ior).abs();
+    (0..indices.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) as u32
 }
 
 /// The record of a material. `indices`: those of [`indices_of_refraction`].
@@ -307,7 +316,7 @@ pub(super) fn record(
         anisotropy: [m.anisotropy.strength * cos, m.anisotropy.strength * sin],
         normal_scale: m.normal_scale,
         clearcoat_normal_scale: m.clearcoat.normal_scale,
-        glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
+        glass_layer: nearest(indices, m.ior),
         priority: m.dielectric_priority,
         parameters: parameters(m),
         occlusion_strength: m.occlusion_strength,

@@ -21,9 +21,14 @@ use crate::scene::{AlphaMode, Filter, Material, TexelData, TextureSlot};
 pub(super) struct Textures {
     pub texels: Buffer,
     pub records: Vec<TextureRecord>,
-    // record of each texture of the scene
-    record_of: Vec<u32>,
+    pub slots: TextureSlots,
     pub mips: Option<Mips>,
+}
+
+/// The record of each texture of the scene, by which materials refer to it.
+#[derive(Clone)]
+pub(super) struct TextureSlots {
+    record_of: Vec<u32>,
 }
 
 /// Mip levels of textures, in one buffer.
@@ -117,9 +122,11 @@ impl Textures {
             .collect();
         let has_mips = needs.mip_levels && needs.shading && !needs.white && !used.is_empty();
         let mips = if has_mips { Some(Mips::upload(device, flat, &used, &uses)?) } else { None };
-        Ok(Self { texels, records, record_of, mips })
+        Ok(Self { texels, records, slots: TextureSlots { record_of }, mips })
     }
+}
 
+impl TextureSlots {
     /// The record of an uploaded texture's use; without a texture, one that reads 1 everywhere.
     pub fn slot(&self, slot: Option<TextureSlot>) -> TextureUse {
         match slot {

@@ -46,6 +46,8 @@ pub struct Frame {
     pub name: String,
     /// The scene: `builtin:NAME`, or a path from the folder.
     pub scene: String,
+    /// Which scene of a glTF file, by its name or number; `None`: the one that the file names.
+    pub gltf_scene: Option<String>,
     pub settings_file: Option<PathBuf>,
     /// The settings; files are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
@@ -126,6 +128,7 @@ struct Defaults {
 struct Entry {
     name: Spanned<String>,
     scene: Spanned<String>,
+    gltf_scene: Option<Spanned<String>>,
     render: Option<Spanned<String>>,
     settings: Option<Spanned<PathBuf>>,
     tracers: Option<Spanned<Vec<String>>>,
@@ -322,7 +325,11 @@ impl Frame {
         if self.tolerance.allows_other_seeds() {
             settings.image.seed = None;
         }
-        settings.flags().join(" ")
+        let chosen = self.gltf_scene.iter().flat_map(|scene| {
+            let word = shlex::try_quote(scene).map_or_else(|_| scene.clone(), |word| word.into_owned());
+            ["--gltf-scene".to_owned(), word]
+        });
+        chosen.chain(settings.flags()).collect::<Vec<_>>().join(" ")
     }
 
     /// Whether it is rendered on this driver.
@@ -347,6 +354,7 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
     let mut frame = Frame {
         name: one_line(entry.name.get_ref()),
         scene: entry.scene.get_ref().clone(),
+        gltf_scene: entry.gltf_scene.as_ref().map(|scene| scene.get_ref().clone()),
         settings_file: entry.settings.as_ref().map(|file| folder.join(file.get_ref())),
         settings: RenderSettings::default(),
         tracers: Tracers::Auto,
@@ -377,6 +385,11 @@ fn complete(
         return Err(source.error(entry.name.span(), message));
     }
     check_scene(source, folder, &entry.scene)?;
+    if let Some(chosen) = entry.gltf_scene.as_ref().filter(|_| !is_gltf(&frame.scene)) {
+        return Err(
+            source.error(chosen.span(), format!("gltf_scene: {} is no glTF file, which may have several", frame.scene))
+        );
+    }
     frame.settings = settings(source, folder, defaults, entry)?;
     let golden = folder.join(format!("{}.{}", frame.name, frame.format.extension()));
     let environment = frame.settings.lighting.environment_file();
@@ -392,6 +405,12 @@ fn complete(
         return Err(source.error(span, message));
     }
     check(frame).map_err(|message| source.error(span, format!("{name}: {message}")))
+}
+
+/// Whether a scene is a glTF file, by its name.
+fn is_gltf(scene: &str) -> bool {
+    let extension = Path::new(scene).extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
 }
 
 /// A name with spaces in place of what would break a line.

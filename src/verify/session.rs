@@ -26,6 +26,7 @@ pub struct VerifySession<'m> {
 
 struct OpenRenderer {
     scene: String,
+    gltf_scene: Option<String>,
     kind: TracerKind,
     renderer: Renderer,
 }
@@ -87,20 +88,22 @@ impl<'m> VerifySession<'m> {
             TracerKind::Compute => TracerChoice::Compute,
         };
         let confine = self.manifest.confine.as_deref().map_or(Confine::Nowhere, Confine::Folder);
+        let is_scene = |open: &OpenRenderer| open.scene == frame.scene && open.gltf_scene == frame.gltf_scene;
         let open = match self.open.take() {
-            Some(open) if open.scene == frame.scene && open.kind == kind => open,
+            Some(open) if is_scene(&open) && open.kind == kind => open,
             before => {
                 let scene = match before {
-                    Some(open) if open.scene == frame.scene => open.renderer.into_scene(),
+                    Some(open) if is_scene(&open) => open.renderer.into_scene(),
                     _ => load::load_with(
                         &self.manifest.scene(frame),
-                        &LoadOptions { confine, ..LoadOptions::default() },
+                        &LoadOptions { confine, scene: frame.gltf_scene.as_deref(), ..LoadOptions::default() },
                     )?,
                 };
                 let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
                 // the manifest's name: a golden image is the same whichever folder it was made in
                 let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
-                OpenRenderer { scene: frame.scene.clone(), kind, renderer }
+                let (scene, gltf_scene) = (frame.scene.clone(), frame.gltf_scene.clone());
+                OpenRenderer { scene, gltf_scene, kind, renderer }
             }
         };
         Ok(&mut self.open.insert(open).renderer)

@@ -11,9 +11,11 @@ use skylit::output::tone_map::ToneMap;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
 use skylit::scene::animation::{
-    Animation, Channel, Interpolation, LocalTransform, Node, Playback, Pose, Property, RigParts, Sampler,
+    AnimatedLight, AnimatedMaterial, Animation, Channel, Interpolation, LightProperty, LocalTransform,
+    MaterialProperty, Node, Playback, Pose, Property, RigParts, SLOTS, Sampler, Target, TextureTransform, ValueChannel,
 };
 use skylit::scene::{AnimationRig, EnvironmentMap, builtin};
+use skylit::tracer::MaterialChange;
 
 const SIZE: [u32; 2] = [32, 18];
 
@@ -452,7 +454,7 @@ fn moving_lights() -> Scene {
         let sampler = Sampler { interpolation: Interpolation::Linear, times: [0.0, 1.0].into(), values };
         channels.push(Channel { node, property: Property::Translation, sampler });
     }
-    parts.animations = vec![Animation { name: "lights".into(), duration: 1.0, channels }];
+    parts.animations = vec![Animation { name: "lights".into(), duration: 1.0, channels, ..Animation::default() }];
     AnimationRig::attach(&mut scene, parts).unwrap();
     scene
 }
@@ -498,6 +500,104 @@ fn gpu_frames_lights_move() {
                 got.len(),
                 some.join(", ")
             );
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// The Cornell box, whose lamp goes out and comes back while its walls change their colour and a point light its intensity, from 0 on.
+fn changing_values() -> Scene {
+    let mut scene = scene("cornell-box");
+    let (lo, hi) = scene.bounds().unwrap();
+    scene.lights.push(Light {
+        name: String::new(),
+        kind: LightKind::Point,
+        intensity: Vec3::ZERO,
+        position: (lo + hi) * 0.5,
+        direction: DVec3::NEG_Z,
+        range: f64::INFINITY,
+    });
+    let lamp = scene.materials.iter().position(|m| m.emissive != Vec3::ZERO).unwrap();
+    let wall = scene.instances.iter().map(|i| scene.meshes[i.mesh].material).find(|m| *m != lamp).unwrap();
+    let material = |k: usize| AnimatedMaterial {
+        materials: vec![k],
+        emissive_factor: scene.materials[k].emissive,
+        emissive_strength: 1.0,
+        transforms: [TextureTransform::default(); SLOTS],
+    };
+    let mut parts = RigParts {
+        instances: vec![None; scene.instances.len()],
+        cameras: vec![None; scene.cameras.len()],
+        lights: vec![None],
+        materials: vec![material(lamp), material(wall)],
+        animated_lights: vec![AnimatedLight { lights: vec![0], color: Vec3::new(1.0, 0.5, 0.2), intensity: 0.0 }],
+        ..RigParts::default()
+    };
+    let channel = |target, values: &[f32]| ValueChannel {
+        target,
+        sampler: Sampler {
+            interpolation: Interpolation::Linear,
+            times: [0.0, 0.5, 1.0].into(),
+            values: values.to_vec(),
+        },
+    };
+    let colours = [0.9, 0.1, 0.1, 1.0, 0.1, 0.9, 0.1, 1.0, 0.1, 0.1, 0.9, 1.0];
+    parts.animations = vec![Animation {
+        name: "values".into(),
+        duration: 1.0,
+        values: vec![
+            channel(Target::Material(0, MaterialProperty::EmissiveStrength), &[1.0, 0.0, 1.0]),
+            channel(Target::Material(1, MaterialProperty::BaseColor), &colours),
+            channel(Target::Material(1, MaterialProperty::Clearcoat), &[0.0, 1.0, 0.0]),
+            channel(Target::Light(0, LightProperty::Intensity), &[0.0, 0.3, 0.3]),
+        ],
+        ..Animation::default()
+    }];
+    AnimationRig::attach(&mut scene, parts).unwrap();
+    scene
+}
+
+/// Materials and lights have the values of their animation: frames are those of the scene with these values, on every tracer, also where a light goes out or begins, and an extension's lobe.
+#[test]
+fn gpu_frames_materials_and_lights_change() {
+    let device = device();
+    let scene = changing_values();
+    let rig = scene.rig.as_ref().unwrap();
+    let motion = || rig.motion(0).unwrap();
+    assert!(motion().is_none() && motion().materials.len() == 2 && motion().lights == [0]);
+    let options = options(16);
+    let camera = record(&scene, &scene.cameras[0]);
+    for kind in tracers(&device) {
+        let flat = FlatScene::with_motion_and_blend(&scene, motion(), Blend::Stochastic).unwrap();
+        let mut changing = tracer(&device, kind, &flat);
+        let mut frames = frames(&changing, &flat, &plain(options.samples.spp), &options);
+        frames.frame(&changing, &camera, &[]).unwrap();
+        let mut before = frames.result().unwrap();
+        for time in [0.25, 0.5, 0.9] {
+            let mut pose = Pose::default();
+            rig.pose(0, time, Playback::Once, &mut pose).unwrap();
+            let mut posed = scene.clone();
+            pose.apply(&mut posed);
+            assert_eq!(changing.set_materials(&pose.materials).unwrap(), MaterialChange::Shading);
+            assert_eq!(changing.set_materials(&pose.materials).unwrap(), MaterialChange::None);
+            frames.move_lights(&changing, &posed).unwrap();
+            frames.rewind();
+            frames.frame(&changing, &camera, &[]).unwrap();
+            let got = frames.result().unwrap();
+            assert!(rmse(&before, &got) > 0.05, "{kind}: nothing changes until {time} s");
+            // a tracer that never knew other values
+            let flat = FlatScene::with_motion_and_blend(&posed, motion(), Blend::Stochastic).unwrap();
+            let still = render(&tracer(&device, kind, &flat), &flat, &options).image.film.mean;
+            let differs = |(got, want): &(&f32, &f32)| (*got - *want).abs() > 2e-5 * want.abs().max(0.01);
+            let wrong = got.iter().zip(&still).filter(differs).count();
+            assert!(wrong * 200 <= got.len(), "{kind}, at {time} s: {wrong} of {} values differ", got.len());
+            // one that knows of no animation has other samples, and the same mean
+            let flat = FlatScene::for_paths(&posed);
+            let plain = render(&tracer(&device, kind, &flat), &flat, &self::options(64)).image.film.mean;
+            let mean = |v: &[f32]| v.iter().sum::<f32>() / v.len() as f32;
+            let ratio = mean(&got) / mean(&plain);
+            assert!((ratio - 1.0).abs() < 0.05, "{kind}, at {time} s: {ratio} of the mean of a static scene");
+            before = got;
         }
     }
     assert_validation_clean(&device);

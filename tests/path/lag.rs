@@ -117,7 +117,7 @@ fn gpu_frames_thin_shadows_move() {
 fn gpu_frames_what_is_uncovered_at_an_edge_has_no_ghost() {
     let device = device();
     let scene = poles(0.2, &[0.0], DVec3::new(0.0, -0.866, -0.5));
-    let motion = Motion { instances: vec![2], meshes: Vec::new() };
+    let motion = Motion { instances: vec![2], meshes: Vec::new(), ..Motion::default() };
     let place = |frame: u32| DAffine3::from_translation(DVec3::X * (-1.5 + 0.15 * f64::from(frame)));
     let mut posed = scene.clone();
     posed.instances[2].object_to_world = place(15);

@@ -22,7 +22,7 @@ fn hall() -> Scene {
 }
 
 fn tracer(device: &std::sync::Arc<skylit::gpu::Device>, kind: TracerKind, scene: &Scene) -> Tracer {
-    let motion = Motion { instances: vec![1], meshes: Vec::new() };
+    let motion = Motion { instances: vec![1], meshes: Vec::new(), ..Motion::default() };
     Tracer::new(device, kind, &FlatScene::with_motion(scene, motion).unwrap(), ALL).unwrap()
 }
 

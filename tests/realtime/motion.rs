@@ -145,7 +145,7 @@ fn block_on_a_floor() -> Scene {
 
 /// What of a scene may move.
 fn moving(device: &Arc<Device>, kind: TracerKind, scene: &Scene, instances: Vec<usize>) -> Tracer {
-    let flat = FlatScene::with_motion(scene, Motion { instances, meshes: Vec::new() }).unwrap();
+    let flat = FlatScene::with_motion(scene, Motion { instances, meshes: Vec::new(), ..Motion::default() }).unwrap();
     Tracer::new(device, kind, &flat, ALL).unwrap()
 }
 

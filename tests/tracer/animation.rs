@@ -10,7 +10,8 @@ use skylit::measure::ray_sets::random_rays;
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::scene::animation::{
-    Animation, Channel, Interpolation, LocalTransform, Node, Playback, Pose, Property, RigParts, Sampler,
+    Animation, Channel, Interpolation, LocalTransform, Node, Playback, Pose, Property, RigParts, Sampler, Target,
+    ValueChannel,
 };
 use skylit::scene::builtin::by_name;
 use skylit::scene::{AnimationRig, Geometry, Scene};
@@ -89,7 +90,7 @@ fn growing() -> Scene {
         let sampler = Sampler { interpolation: Interpolation::Linear, times: [0.0, 1.0].into(), values };
         channels.push(Channel { node, property: Property::Scale, sampler });
     }
-    parts.animations = vec![Animation { name: "grow".into(), duration: 1.0, channels }];
+    parts.animations = vec![Animation { name: "grow".into(), duration: 1.0, channels, ..Animation::default() }];
     AnimationRig::attach(&mut scene, parts).unwrap();
     scene
 }
@@ -101,6 +102,60 @@ fn gpu_what_shrinks_to_nothing_comes_back() {
     for kind in tracers(&device) {
         let stale = follow(&device, kind, &scene, 0, &[0.5, 0.0, 1e-8, 0.999_999, 0.25]);
         assert!(stale[0] > 1e-3 && stale[4] > 1e-3, "{kind}: {stale:?}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// The growing scene, of whose animation a channel hides an instance, or all, from 1 s to 2 s.
+fn switching(instances: &[usize]) -> Scene {
+    let mut scene = growing();
+    let mut parts = scene.rig.as_ref().unwrap().parts().clone();
+    let node = parts.nodes.len();
+    parts.nodes.push(Node::default());
+    parts.switched_instances = instances.iter().map(|i| (*i, node)).collect();
+    let (times, values) = ([0.0, 1.0, 2.0].into(), vec![1.0, 0.0, 1.0]);
+    let sampler = Sampler { interpolation: Interpolation::Step, times, values };
+    parts.animations[0].values.push(ValueChannel { target: Target::Visibility(node), sampler });
+    parts.animations[0].duration = 3.0;
+    AnimationRig::attach(&mut scene, parts).unwrap();
+    scene
+}
+
+/// What is hidden is missed on every tracer, and hit again once it is shown; what is hidden from the first frame on, too.
+#[test]
+fn gpu_what_is_hidden_is_missed() {
+    let device = device();
+    // the largest block and what grows: one that moves and one that does not
+    let last = growing().instances.len() - 1;
+    let scene = switching(&[0, last]);
+    for kind in tracers(&device) {
+        let stale = follow(&device, kind, &scene, 0, &[1.5, 0.5, 1.0, 2.5, 1.9]);
+        assert!(stale.iter().all(|s| *s > 1e-3), "{kind}: {stale:?}");
+    }
+
+    // hidden altogether
+    let all: Vec<usize> = (0..=last).collect();
+    let scene = switching(&all);
+    let rig = scene.rig.as_ref().unwrap();
+    let oracle = Oracle::new(&scene, scene.origin());
+    let rays = random_rays(&oracle, RAYS, 6);
+    let flat = FlatScene::with_motion(&scene, rig.motion(0).unwrap()).unwrap();
+    for kind in tracers(&device) {
+        let mut tracer = Tracer::new(&device, kind, &flat, ALL).unwrap();
+        let mut pose = Pose::default();
+        for (seconds, hits) in [(0.5, true), (1.5, false), (2.5, true)] {
+            rig.pose(0, seconds, Playback::Once, &mut pose).unwrap();
+            tracer.update(&pose.changes()).unwrap();
+            let hit = closest(&tracer, &rays).iter().filter(|h| h.instance != u32::MAX).count();
+            assert_eq!(hit > RAYS / 20, hits, "{kind}, at {seconds} s: {hit} hits");
+            assert!(hits || hit == 0, "{kind}: {hit} hits of what is hidden");
+        }
+        // hidden at rest: the tracer begins that way
+        let mut at_rest = scene.clone();
+        at_rest.hidden = all.iter().copied().collect();
+        let flat = FlatScene::with_motion(&at_rest, rig.motion(0).unwrap()).unwrap();
+        let tracer = Tracer::new(&device, kind, &flat, ALL).unwrap();
+        assert!(closest(&tracer, &rays).iter().all(|h| h.instance == u32::MAX), "{kind}: hits before any update");
     }
     assert_validation_clean(&device);
 }

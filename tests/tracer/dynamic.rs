@@ -64,6 +64,7 @@ impl Follower {
                 .iter()
                 .map(|&mesh| MeshChange { mesh, positions: positions(scene, mesh), normals: None })
                 .collect(),
+            ..Changes::default()
         };
         let oracle = Oracle::new(scene, scene.origin());
         let rays = random_rays(&oracle, RAYS, 11 + self.steps);
@@ -114,7 +115,12 @@ fn gpu_moving_instances() {
             let scene = scene(name);
             let moving =
                 if name == "cornell-spheres" { vec![0, scene.instances.len() - 1] } else { all_instances(&scene) };
-            let mut f = Follower::new(&device, kind, &scene, Motion { instances: moving.clone(), meshes: Vec::new() });
+            let mut f = Follower::new(
+                &device,
+                kind,
+                &scene,
+                Motion { instances: moving.clone(), meshes: Vec::new(), ..Motion::default() },
+            );
             for step in 0..2 {
                 let stats = f.step(|s| wander(s, &moving, step, far));
                 assert!(stats.top_rebuilt && stats.rebuilt.is_empty());
@@ -131,7 +137,12 @@ fn gpu_many_moving_instances() {
     let scene = scene("grid:8");
     let moving = all_instances(&scene);
     for kind in tracers(&device) {
-        let mut f = Follower::new(&device, kind, &scene, Motion { instances: moving.clone(), meshes: Vec::new() });
+        let mut f = Follower::new(
+            &device,
+            kind,
+            &scene,
+            Motion { instances: moving.clone(), meshes: Vec::new(), ..Motion::default() },
+        );
         let first = f.step(|s| wander(s, &moving, 0, 0.05));
         assert_eq!(first.top_rebuilt, kind != TracerKind::Compute);
         // all elsewhere: the old tree is of no use
@@ -182,7 +193,12 @@ fn gpu_deforming_mesh() {
     let device = device();
     let (scene, mesh) = sphere_on_a_plane();
     for kind in tracers(&device) {
-        let mut f = Follower::new(&device, kind, &scene, Motion { instances: Vec::new(), meshes: vec![mesh] });
+        let mut f = Follower::new(
+            &device,
+            kind,
+            &scene,
+            Motion { instances: Vec::new(), meshes: vec![mesh], ..Motion::default() },
+        );
         let used = positions(&scene, mesh).len() - 1;
         for step in 0..3 {
             f.step(|s| waves(&mut positions_mut(s, mesh)[..used], step));
@@ -216,7 +232,12 @@ fn gpu_moving_and_deforming() {
     let (scene, mesh) = sphere_on_a_plane();
     let instances = vec![0, scene.instances.len() - 1];
     for kind in tracers(&device) {
-        let mut f = Follower::new(&device, kind, &scene, Motion { instances: instances.clone(), meshes: vec![mesh] });
+        let mut f = Follower::new(
+            &device,
+            kind,
+            &scene,
+            Motion { instances: instances.clone(), meshes: vec![mesh], ..Motion::default() },
+        );
         let used = positions(&scene, mesh).len() - 1;
         for step in 0..2 {
             f.step(|s| {
@@ -235,7 +256,8 @@ fn gpu_nothing_leaks_after_a_refit() {
     let mut scene = scene("plane");
     scene.meshes[0].geometry = shapes::icosphere(1.0, 5);
     scene.instances[0].object_to_world = DAffine3::IDENTITY;
-    let flat = FlatScene::with_motion(&scene, Motion { instances: Vec::new(), meshes: vec![0] }).unwrap();
+    let flat =
+        FlatScene::with_motion(&scene, Motion { instances: Vec::new(), meshes: vec![0], ..Motion::default() }).unwrap();
     assert!(flat.is_single_level());
     let mut tracer = Tracer::new(&device, TracerKind::Compute, &flat, ALL).unwrap();
     let sphere = positions(&scene, 0).to_vec();
@@ -269,7 +291,7 @@ fn gpu_bad_changes_are_refused_and_change_nothing() {
     let oracle = Oracle::new(&scene, scene.origin());
     let rays = random_rays(&oracle, 5000, 3);
     for kind in tracers(&device) {
-        let motion = Motion { instances: vec![last], meshes: vec![mesh] };
+        let motion = Motion { instances: vec![last], meshes: vec![mesh], ..Motion::default() };
         let mut tracer = Tracer::new(&device, kind, &FlatScene::with_motion(&scene, motion).unwrap(), ALL).unwrap();
         let before = closest(&tracer, &rays);
         let deform = |mesh, positions| vec![MeshChange { mesh, positions, normals: None }];
@@ -282,21 +304,21 @@ fn gpu_bad_changes_are_refused_and_change_nothing() {
             (vec![(last, moved)], deform(mesh, &good[1..]), "vertices"),
             (vec![(last, moved)], deform(mesh, &bad), "vertex 5"),
         ] {
-            let e = tracer.update(&Changes { instances, meshes }).unwrap_err();
+            let e = tracer.update(&Changes { instances, meshes, ..Changes::default() }).unwrap_err();
             assert!(matches!(e, Error::Usage(_) | Error::Scene(_)) && e.to_string().contains(words), "{e}");
             assert_eq!(before, closest(&tracer, &rays), "{kind}: {e}");
         }
         let e = common::tracer(&device, kind, &scene).update(&Changes::default()).unwrap_err();
         assert!(e.to_string().contains("with_motion"), "{e}");
     }
-    let motion = Motion { instances: vec![last], meshes: Vec::new() };
+    let motion = Motion { instances: vec![last], meshes: Vec::new(), ..Motion::default() };
     let flat = FlatScene::with_motion(&scene, motion).unwrap();
     let e = Tracer::with_options(&device, TracerKind::Compute, &flat, ALL, Kernel::Nearest).err().unwrap();
     assert!(e.to_string().contains("--traversal wide"), "{e}");
     let spheres = by_name("spheres:5").unwrap();
     for motion in [
-        Motion { instances: vec![999], meshes: Vec::new() },
-        Motion { instances: Vec::new(), meshes: vec![999] },
+        Motion { instances: vec![999], meshes: Vec::new(), ..Motion::default() },
+        Motion { instances: Vec::new(), meshes: vec![999], ..Motion::default() },
         Motion {
             instances: Vec::new(),
             meshes: spheres
@@ -321,7 +343,7 @@ fn gpu_a_scene_that_stays_pays_nothing() {
     let none = FlatScene::with_motion(&scene, Motion::default()).unwrap();
     let stats = Tracer::new(&device, TracerKind::Compute, &none, ALL).unwrap().stats();
     assert_eq!((stays.structure_bytes, stays.stack_entries), (stats.structure_bytes, stats.stack_entries));
-    let moves = Motion { instances: vec![0], meshes: Vec::new() };
+    let moves = Motion { instances: vec![0], meshes: Vec::new(), ..Motion::default() };
     let moves = Tracer::new(&device, TracerKind::Compute, &FlatScene::with_motion(&scene, moves).unwrap(), ALL)
         .unwrap()
         .stats();

@@ -23,7 +23,7 @@ use crate::realtime::{Preset, Realtime, Settings, Surface};
 use crate::scene::builtin::moving_box::Mover;
 use crate::scene::{Camera, Environment, EnvironmentMap, Orbit, Scene};
 use crate::terminal::interrupt::SilentControl;
-use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer, UpdateStats};
+use crate::tracer::{BuildOptions, Changes, ComputeOptions, MaterialChange, MovedBounds, Tracer, UpdateStats};
 
 /// Seeds of the halves of a reference; no preset has them.
 pub const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
@@ -109,6 +109,8 @@ pub struct FrameInputs {
     pub to_map: Option<DMat3>,
     /// The scene in its pose, if that moves lights.
     pub posed: Option<Arc<Scene>>,
+    /// What of materials has changed.
+    pub materials: MaterialChange,
     /// The time of updating the tracer, where objects move.
     pub update_seconds: Option<f64>,
 }
@@ -119,6 +121,7 @@ impl FrameInputs {
         if let Some(to_map) = self.to_map {
             realtime.turn_environment(to_map);
         }
+        realtime.change_materials(self.materials);
         self.posed.as_ref().map_or(Ok(()), |posed| realtime.move_lights(tracer, posed))
     }
 }
@@ -201,7 +204,14 @@ impl<'a> SceneStage<'a> {
         if !motion.moves_objects() {
             self.rest()?;
         }
-        let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map, posed: None, update_seconds: None };
+        let inputs = |camera, moved, to_map| FrameInputs {
+            camera,
+            moved,
+            to_map,
+            posed: None,
+            update_seconds: None,
+            materials: Default::default(),
+        };
         let seconds = |update: &UpdateStats| Some(update.mesh_seconds + update.top_seconds);
         Ok(match motion {
             Motion::Orbit(orbit) => {
@@ -214,12 +224,13 @@ impl<'a> SceneStage<'a> {
             }
             Motion::Animation(sequence) => {
                 let (_, update) = sequence.frame(f64::from(frame), &mut self.tracer)?;
+                let materials = update.materials;
                 let posed = sequence.posed_lights().cloned();
                 if let Some(posed) = &posed {
                     self.sampler.move_lights(&self.tracer, posed)?;
                 }
                 let update_seconds = seconds(&update);
-                FrameInputs { posed, update_seconds, ..inputs(camera, update.moved, None) }
+                FrameInputs { posed, materials, update_seconds, ..inputs(camera, update.moved, None) }
             }
             Motion::Slide(mover) => {
                 let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);

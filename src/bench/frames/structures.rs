@@ -43,7 +43,7 @@ fn measure_scene(session: &mut FramesSession, source: &str) -> Result<()> {
     // the scene, whose instances and first mesh move
     session.phase(format!("structures of {source}: building"));
     let scene = load::load(source)?;
-    let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![MESH] };
+    let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![MESH], ..Motion::default() };
     let flat = FlatScene::with_motion(&scene, motion)?;
     let (kind, _) = session.args.tracer.on(session.device.info());
     let [width, height] = session.args.size();

@@ -40,7 +40,9 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
         FrameSequence::new(scene, view.camera.clone(), None, CameraMotion::Still, animation, FRAMES_PER_SECOND)
     };
     let motion = match loaded.mover {
-        Some(mover) => scene::Motion { instances: vec![mover.instance], meshes: Vec::new() },
+        Some(mover) => {
+            scene::Motion { instances: vec![mover.instance], meshes: Vec::new(), ..scene::Motion::default() }
+        }
         None => loaded.views.first().map(sequence).transpose()?.map_or(Ok(scene::Motion::default()), |s| s.motion())?,
     };
     let flat = FlatScene::with_motion_and_blend(scene, motion, args.integrator().get().blend())?;

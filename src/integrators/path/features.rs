@@ -15,7 +15,8 @@ pub(super) fn features(
     cones: bool,
 ) -> (PathFeatures, LightKinds) {
     let plain = options.white_sky.is_some() || options.view.is_some();
-    let clear_walls = !plain && flat.scene.materials.iter().any(shading::has_clear_walls);
+    let mut states = (0..flat.scene.materials.len()).flat_map(|k| flat.motion.states(flat.scene, k));
+    let clear_walls = !plain && states.any(shading::has_clear_walls);
     let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
         (PathFeature::LightTree, samples_lights && lights.placed > 1),

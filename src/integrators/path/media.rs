@@ -24,7 +24,8 @@ pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
     used.dedup();
-    let media: Vec<&Material> = used.into_iter().map(|m| &flat.scene.materials[m]).filter(|m| is_medium(m)).collect();
+    let media: Vec<&Material> =
+        used.into_iter().flat_map(|k| flat.motion.states(flat.scene, k)).filter(|m| is_medium(m)).collect();
     media.len() > 1 || media.iter().any(|m| absorbs(m) || disperses(m))
 }
 
@@ -64,7 +65,7 @@ impl ClosedVolumes {
             }
             Some(VolumeMesh { material: mesh.material as u32, to_object: to_world.inverse(), triangles, spheres })
         };
-        Self(scene.instances.iter().filter_map(body).collect())
+        Self(scene.shown_instances().filter_map(body).collect())
     }
 
     /// The volumes that contain a point (relative to the scene's origin), innermost first, then

@@ -69,7 +69,7 @@ impl SignalPaths {
     ///
     /// # Errors
     /// Those of the device.
-    pub fn surfaces(&self, tracer: &Tracer, scene: &Scene, pixels: u32) -> Result<GuideRays> {
+    pub fn surfaces(&self, tracer: &Tracer, flat: &FlatScene, pixels: u32) -> Result<GuideRays> {
         let device = tracer.device();
         let PathEstimator { features, light_kinds, .. } = &self.paths;
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
@@ -84,7 +84,8 @@ impl SignalPaths {
                 states: [states()?, states()?],
             })
         };
-        let behind = scene.materials.iter().any(may_be_smooth).then(behind).transpose()?;
+        let mut states = (0..flat.scene.materials.len()).flat_map(|k| flat.motion.states(flat.scene, k));
+        let behind = states.any(may_be_smooth).then(behind).transpose()?;
         Ok(GuideRays {
             camera: tracer.specialized(&shaders::PATH_SURFACE_CLOSEST, &constants)?,
             behind,

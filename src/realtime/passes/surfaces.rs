@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::uncovered::Uncovered;
+use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
 use crate::gpu::Recorder;
@@ -11,7 +12,6 @@ use crate::interface::records::radiance::SurfacesParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Pass, Range, Stage};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
-use crate::scene::Scene;
 use crate::tracer::{Push, Tracer};
 
 struct Surfaces {
@@ -27,7 +27,7 @@ struct Surfaces {
 /// The pass over all pixels of an image, which lists `uncovered` ones if there are histories.
 pub fn stage(
     tracer: &Tracer,
-    scene: &Scene,
+    flat: &FlatScene,
     paths: &SignalPaths,
     block: Block,
     uncovered: Option<Arc<Uncovered>>,
@@ -35,7 +35,7 @@ pub fn stage(
 ) -> Result<Stage> {
     let ranges = Range::launches(block.rays(), 1, launch_rays);
     let pass = Surfaces {
-        rays: paths.surfaces(tracer, scene, ranges.iter().map(|r| r.count).max().unwrap_or(0))?,
+        rays: paths.surfaces(tracer, flat, ranges.iter().map(|r| r.count).max().unwrap_or(0))?,
         path: paths.params_address(),
         is_dynamic: tracer.is_dynamic(),
         keeps_hits: paths.can_begin_at_known(),

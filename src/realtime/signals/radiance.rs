@@ -97,7 +97,7 @@ fn stages(
     let uncovered = || Uncovered::new(tracer.device(), sampled).map(Arc::new);
     let uncovered = (settings.history > 1).then(uncovered).transpose()?;
     let mut stages = vec![
-        surfaces::stage(tracer, flat.scene, &paths, block, uncovered.clone(), settings.launch_rays)?,
+        surfaces::stage(tracer, flat, &paths, block, uncovered.clone(), settings.launch_rays)?,
         paths::stage(tracer, paths, sampled, uncovered, settings, has_rest)?,
         radiance_temporal::stage(tracer, pixels, has_rest)?,
     ];

@@ -22,7 +22,9 @@ use crate::realtime::sequence;
 use crate::scene::animation::{AnimationRig, Playback, Pose};
 use crate::scene::{AlphaMode, Camera, Motion, Scene};
 use crate::shaders::StreamShaders;
-use crate::tracer::{BuildStats, ComputeOptions, DeviceSettings, MovedBounds, Needs, Tracer, TracerKind};
+use crate::tracer::{
+    BuildStats, ComputeOptions, DeviceSettings, MaterialChange, MovedBounds, Needs, Tracer, TracerKind,
+};
 
 pub use pick::Pick;
 pub use view::{
@@ -67,6 +69,8 @@ struct TracedScene<'r> {
     moved: Vec<MovedBounds>,
     /// The scene in its pose, if the animation moves lights or surfaces that emit light.
     posed: Option<Box<Scene>>,
+    /// What of materials the last change of pose has changed.
+    materials: MaterialChange,
 }
 
 impl Renderer {
@@ -154,8 +158,14 @@ impl<'r> Interactive<'r> {
     /// A camera of the file as the animation has moved it; `None` if it does not move it.
     pub fn animated_camera(&self, index: usize) -> Option<Camera> {
         let pose = &self.animation.as_ref()?.pose;
-        let (_, camera_to_world) = pose.cameras.iter().find(|(k, _)| *k == index)?;
-        Some(Camera { camera_to_world: *camera_to_world, ..self.scene.cameras.get(index)?.clone() })
+        let placed = pose.cameras.iter().find(|(k, _)| *k == index);
+        if placed.is_none() && !pose.lenses.iter().any(|(k, ..)| *k == index) {
+            return None;
+        }
+        let mut camera = self.scene.cameras.get(index)?.clone();
+        camera.camera_to_world = placed.map_or(camera.camera_to_world, |(_, to_world)| *to_world);
+        pose.set_lens(Some(index), &mut camera);
+        Some(camera)
     }
 
     /// The first camera, for images of `aspect` = width / height: the file's, or an automatic one.
@@ -231,7 +241,16 @@ impl<'r> Interactive<'r> {
             None => false,
         };
         let posed = moves_lights.then(|| Box::new(self.scene.clone()));
-        let mut traced = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new(), posed };
+        let mut traced = TracedScene {
+            flat,
+            tracer,
+            needs,
+            number: self.built,
+            pose: 0,
+            moved: Vec::new(),
+            posed,
+            materials: MaterialChange::None,
+        };
         if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
             traced.update(&animation.pose)?;
         }
@@ -250,10 +269,11 @@ impl TracedScene<'_> {
         if self.tracer.is_dynamic() {
             self.moved = self.tracer.update(&pose.changes())?.moved;
         }
+        self.materials = self.tracer.set_materials(&pose.materials)?;
         if let Some(posed) = &mut self.posed {
             pose.apply(posed);
         }
-        if self.tracer.is_dynamic() || self.posed.is_some() {
+        if self.tracer.is_dynamic() || self.posed.is_some() || self.materials != MaterialChange::None {
             self.pose += 1;
         }
         Ok(())

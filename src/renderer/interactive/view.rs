@@ -269,6 +269,9 @@ impl View {
             Kind::Frames(view) => {
                 let record = CameraRecord::new(camera, traced.flat.origin, aspect);
                 let moved = if has_moved { &traced.moved[..] } else { &[] };
+                if has_moved {
+                    view.realtime.change_materials(traced.materials);
+                }
                 view.resting = if rests && !view.was_interrupted { view.resting.saturating_add(1) } else { 0 };
                 let step = view.step(traced, &record, moved, control);
                 view.was_interrupted = step.is_err();

@@ -204,7 +204,7 @@ enum Shape {
 impl Emitters {
     fn new(scene: &Scene, emission: &[Emission]) -> Self {
         let mut emitters = Self { shapes: Vec::new(), sums: Vec::new() };
-        for instance in &scene.instances {
+        for instance in scene.shown_instances() {
             let mesh = &scene.meshes[instance.mesh];
             let luminance = emission[mesh.material].mean;
             if luminance <= 0.0 || scene.materials[mesh.material].unlit {

@@ -1,6 +1,7 @@
 //! Validation of a rig against its scene.
 
-use super::{Animation, Channel, Deformation, LocalTransform, Property, RigParts, Skin};
+use super::MaterialProperty as Number;
+use super::{Animation, Channel, Deformation, LocalTransform, Property, RigParts, SLOTS, Skin, Target, ValueChannel};
 use crate::scene::{Geometry, Scene};
 
 /// Fails with a message that names the invalid part.
@@ -56,6 +57,16 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
             None => Ok(()),
         }
     };
+    // what animations hide
+    let switched = [
+        ("instance", &parts.switched_instances, scene.instances.len()),
+        ("light", &parts.switched_lights, scene.lights.len()),
+    ];
+    for (what, switched, there) in switched {
+        if let Some((i, node)) = switched.iter().find(|(i, node)| *i >= there || *node >= nodes) {
+            return Err(format!("{what} {i} of {there} is shown by node {node}, of {nodes}"));
+        }
+    }
     on("instances", &parts.instances, scene.instances.len())?;
     on("cameras", &parts.cameras, scene.cameras.len())?;
     on("lights", &parts.lights, scene.lights.len())
@@ -135,7 +146,27 @@ fn check_animation(animation: &Animation, parts: &RigParts) -> Result<(), String
     for (i, channel) in animation.channels.iter().enumerate() {
         check_channel(channel, parts).map_err(|e| format!("channel {i}: {e}"))?;
     }
+    for (i, channel) in animation.values.iter().enumerate() {
+        check_values(channel, parts).map_err(|e| format!("channel {i} of values: {e}"))?;
+    }
     Ok(())
+}
+
+fn check_values(channel: &ValueChannel, parts: &RigParts) -> Result<(), String> {
+    let (what, index, count) = match channel.target {
+        Target::Material(
+            _,
+            Number::TextureOffset(slot) | Number::TextureRotation(slot) | Number::TextureScale(slot),
+        ) if slot >= SLOTS => ("texture", slot, SLOTS),
+        Target::Material(k, _) => ("animated material", k, parts.materials.len()),
+        Target::Light(k, _) => ("animated light", k, parts.animated_lights.len()),
+        Target::Camera(k, _) => ("animated camera", k, parts.animated_cameras.len()),
+        Target::Visibility(n) => ("node", n, parts.nodes.len()),
+    };
+    if index >= count {
+        return Err(format!("{what} {index} does not exist (there are {count})"));
+    }
+    channel.sampler.check(channel.target.width())
 }
 
 fn check_channel(channel: &Channel, parts: &RigParts) -> Result<(), String> {

@@ -39,6 +39,9 @@ impl AnimationRig {
     pub(in crate::scene) fn keep_instances(&mut self, keep: &[bool]) {
         let mut each = keep.iter();
         self.parts.instances.retain(|_| each.next().copied().unwrap_or(true));
+        let number = super::renumbered(keep);
+        self.parts.switched_instances.retain(|(i, _)| keep[*i]);
+        self.parts.switched_instances.iter_mut().for_each(|(i, _)| *i = number[*i]);
         let mut each = keep.iter();
         self.floors.retain(|_| each.next().copied().unwrap_or(true));
     }

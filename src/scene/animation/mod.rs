@@ -16,15 +16,23 @@ mod keep;
 mod pose;
 mod sampler;
 mod transform;
+mod values;
 
 pub use deform::{Deformation, Influences, MorphTarget, VertexData};
 pub use pose::{Playback, Pose, PosedMesh};
 pub use sampler::{Interpolation, Sampler};
 pub(in crate::scene) use transform::anchor;
+pub use values::{
+    AnimatedLight, AnimatedMaterial, CameraProperty, LightProperty, MaterialProperty, SLOTS, Target, TextureTransform,
+    ValueChannel,
+};
+
+use std::collections::BTreeMap;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::Scene;
+use super::material::VariantMaterials;
+use super::{Camera, Light, Material, Scene};
 use crate::error::{Error, Result};
 
 /// Transform of a node relative to its parent.
@@ -83,6 +91,8 @@ pub struct Node {
     pub local: LocalTransform,
     /// Weights of the morph targets of its meshes, one per target.
     pub weights: Vec<f32>,
+    /// Whether it and all below it are hidden at rest.
+    pub hidden: bool,
 }
 
 /// A skin (glTF): joints and inverse bind matrices.
@@ -130,6 +140,8 @@ pub struct Animation {
     pub duration: f64,
     /// Channels, at most one for each property of a node.
     pub channels: Vec<Channel>,
+    /// Channels of other values, at most one for each target.
+    pub values: Vec<ValueChannel>,
 }
 
 /// The data of an [`AnimationRig`].
@@ -151,6 +163,17 @@ pub struct RigParts {
     /// The node of each of the first of [`Scene::lights`]; `None` for a static light, as are those
     /// beyond.
     pub lights: Vec<Option<usize>>,
+    /// Materials that animations may change.
+    pub materials: Vec<AnimatedMaterial>,
+    /// Lights that animations may change beside moving them.
+    pub animated_lights: Vec<AnimatedLight>,
+    /// Cameras that animations may change beside moving them: those of [`Scene::cameras`] that are
+    /// one camera of the file.
+    pub animated_cameras: Vec<Vec<usize>>,
+    /// Instances that an animation may hide, and the node by which each is hidden or shown.
+    pub switched_instances: Vec<(usize, usize)>,
+    /// Lights that an animation may hide, and the node by which each is hidden or shown.
+    pub switched_lights: Vec<(usize, usize)>,
 }
 
 /// A scene's animations, with the nodes, skins and meshes that they act on.
@@ -165,6 +188,17 @@ pub struct AnimationRig {
     shapes: Vec<VertexData>,
     /// For each instance the minimum scale.
     floors: Vec<f64>,
+    /// The animated materials at rest, by index. Empty until [`AnimationRig::apply_rest_pose`], as
+    /// are the following.
+    rest_materials: BTreeMap<usize, Material>,
+    /// Materials that are a copy of others by the variant of the scene.
+    varied: Vec<(usize, VariantMaterials)>,
+    /// The lights at rest.
+    rest_lights: Vec<Light>,
+    /// The cameras at rest.
+    rest_cameras: Vec<Camera>,
+    /// The variant of the scene.
+    variant: Option<usize>,
 }
 
 impl AnimationRig {
@@ -196,7 +230,18 @@ impl AnimationRig {
         }
         let still =
             parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_constant(&parts.nodes[c.node])).collect());
-        Ok(Self { still: still.collect(), rest, shapes: Vec::new(), floors: Vec::new(), parts })
+        Ok(Self {
+            still: still.collect(),
+            rest,
+            shapes: Vec::new(),
+            floors: Vec::new(),
+            rest_materials: BTreeMap::new(),
+            varied: Vec::new(),
+            rest_lights: Vec::new(),
+            rest_cameras: Vec::new(),
+            variant: None,
+            parts,
+        })
     }
 
     /// Nodes, skins, deformations and animations of the rig.
@@ -209,11 +254,26 @@ impl AnimationRig {
         &self.parts.animations
     }
 
+    /// Notes which variant of its materials the scene is in.
+    pub(in crate::scene) fn set_variant(&mut self, variant: Option<usize>) {
+        self.variant = variant;
+    }
+
     /// A deforming undeformed mesh, before targets and skin. `deformation` is an index into
     /// [`RigParts::deformations`].
     pub fn undeformed(&self, deformation: usize) -> Option<&VertexData> {
         self.shapes.get(deformation)
     }
+}
+
+/// The new index of each of what is kept.
+pub(in crate::scene) fn renumbered(keep: &[bool]) -> Vec<usize> {
+    let mut next = 0;
+    let count = |&keep: &bool| {
+        next += usize::from(keep);
+        next - usize::from(keep)
+    };
+    keep.iter().map(count).collect()
 }
 
 impl Channel {

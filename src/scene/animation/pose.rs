@@ -1,14 +1,17 @@
 //! Playback: what an animation changes, and the pose at a time.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DAffine3, DVec3};
 
 use super::transform::{anchor, at_least};
-use super::{Animation, AnimationRig, Channel, Deformation, LocalTransform, Property, VertexData};
+use super::{
+    Animation, AnimationRig, Channel, Deformation, LightProperty, LocalTransform, MaterialProperty, Property, Target,
+    VertexData,
+};
 use crate::error::{Error, Result};
 use crate::scene::camera::rigid;
-use crate::scene::{Geometry, Motion, Scene};
+use crate::scene::{Camera, ClipPlanes, Geometry, Light, Material, Motion, Projection, Scene};
 
 /// Behaviour after the end of an animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +59,15 @@ pub struct Pose {
     /// Moving lights (indices into [`Scene::lights`]) and the transforms of their nodes to world
     /// space, without scale.
     pub lights: Vec<(usize, DAffine3)>,
+    /// Materials that change (indices into [`Scene::materials`]).
+    pub materials: Vec<(usize, Material)>,
+    /// Lights whose colour, intensity, range or angles change (indices into [`Scene::lights`]); a
+    /// hidden one is black. Where they are does not count.
+    pub light_values: Vec<(usize, Light)>,
+    /// Cameras whose projection or clipping planes change (indices into [`Scene::cameras`]).
+    pub lenses: Vec<(usize, Projection, ClipPlanes)>,
+    /// Instances that may be hidden (indices into [`Scene::instances`]), and whether they are.
+    pub hidden: Vec<(usize, bool)>,
     scratch: Scratch,
 }
 
@@ -85,6 +97,13 @@ impl Deforming<'_> {
 }
 
 impl Pose {
+    /// Gives a camera, which is this one of the scene, its projection and clipping planes.
+    pub fn set_lens(&self, index: Option<usize>, camera: &mut Camera) {
+        if let Some((_, projection, clip)) = self.lenses.iter().find(|(k, ..)| Some(*k) == index) {
+            (camera.projection, camera.clip) = (*projection, *clip);
+        }
+    }
+
     /// Applies the pose to the scene for which it was computed.
     pub fn apply(&self, scene: &mut Scene) {
         for &(i, to_world) in &self.instances {
@@ -108,6 +127,30 @@ impl Pose {
                 light.place(&to_world);
             }
         }
+
+        // what is no transform
+        for (i, material) in &self.materials {
+            if let Some(place) = scene.materials.get_mut(*i) {
+                place.clone_from(material);
+            }
+        }
+        for (i, values) in &self.light_values {
+            if let Some(light) = scene.lights.get_mut(*i) {
+                (light.kind, light.intensity, light.range) = (values.kind, values.intensity, values.range);
+            }
+        }
+        for &(i, projection, clip) in &self.lenses {
+            if let Some(camera) = scene.cameras.get_mut(i) {
+                (camera.projection, camera.clip) = (projection, clip);
+            }
+        }
+        for &(i, hidden) in &self.hidden {
+            if hidden {
+                scene.hidden.insert(i);
+            } else {
+                scene.hidden.remove(&i);
+            }
+        }
     }
 }
 
@@ -123,10 +166,162 @@ impl AnimationRig {
         let deformations = &self.parts.deformations;
         let deforming = self.find_deforming(animation, &live);
         let deform = |d: &&Deformation| deforming.deforms(d);
+        let mut instances: Vec<usize> = self.moved(&self.parts.instances, &live).map(|(i, _)| i).collect();
+        let switched = self.switched(animation);
+        for &(i, node) in &self.parts.switched_instances {
+            if switched[node] && !instances.contains(&i) {
+                instances.push(i);
+            }
+        }
         Ok(Motion {
-            instances: self.moved(&self.parts.instances, &live).map(|(i, _)| i).collect(),
+            instances,
             meshes: deformations.iter().filter(deform).map(|d| d.mesh).collect(),
+            materials: self.extreme_materials(animation),
+            lights: self.changing_lights(animation),
         })
+    }
+
+    /// The materials that an animation changes, each with others that between them need all that it
+    /// ever needs.
+    fn extreme_materials(&self, animation: usize) -> BTreeMap<usize, Vec<Material>> {
+        let mut ranges: BTreeMap<usize, Vec<_>> = BTreeMap::new();
+        for channel in &self.parts.animations[animation].values {
+            if let Target::Material(k, property) = channel.target {
+                ranges.entry(k).or_default().push((property, channel.range()));
+            }
+        }
+        let mut all: BTreeMap<usize, Vec<Material>> = BTreeMap::new();
+        for (k, ranges) in ranges {
+            let animated = &self.parts.materials[k];
+            for i in &animated.materials {
+                if let Some(rest) = self.rest_materials.get(i) {
+                    all.insert(*i, animated.extremes(rest, &ranges).into());
+                }
+            }
+        }
+        for (i, variants) in &self.varied {
+            if let Some(same) = all.get(&variants.material(self.variant)).cloned() {
+                all.insert(*i, same);
+            }
+        }
+        all
+    }
+
+    /// The lights that an animation changes beside moving them.
+    fn changing_lights(&self, animation: usize) -> Vec<usize> {
+        let switched = self.switched(animation);
+        let mut all: Vec<usize> =
+            self.parts.switched_lights.iter().filter(|(_, node)| switched[*node]).map(|(i, _)| *i).collect();
+        for channel in &self.parts.animations[animation].values {
+            if let Target::Light(k, _) = channel.target {
+                all.extend(&self.parts.animated_lights[k].lights);
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// For each node, whether an animation hides and shows it, directly or through a parent.
+    fn switched(&self, animation: usize) -> Vec<bool> {
+        let mut switched = vec![false; self.parts.nodes.len()];
+        for channel in self.parts.animations.get(animation).iter().flat_map(|a| &a.values) {
+            if let Target::Visibility(node) = channel.target {
+                switched[node] = true;
+            }
+        }
+        self.spread(&mut switched);
+        switched
+    }
+
+    /// For each node, whether it is hidden at a time of an animation, or at rest.
+    fn hidden(&self, playing: Option<(&Animation, f64)>) -> Vec<bool> {
+        let mut hidden: Vec<bool> = self.parts.nodes.iter().map(|n| n.hidden).collect();
+        for (channel, seconds) in playing.iter().flat_map(|(a, t)| a.values.iter().map(|c| (c, *t))) {
+            if let Target::Visibility(node) = channel.target {
+                hidden[node] = channel.value(seconds)[0] < 0.5;
+            }
+        }
+        self.spread(&mut hidden);
+        hidden
+    }
+
+    /// Computes what changes beside transforms and vertices.
+    fn pose_values(&self, playing: &Animation, seconds: f64, pose: &mut Pose) {
+        let mut materials: BTreeMap<usize, Vec<(MaterialProperty, [f32; 4])>> = BTreeMap::new();
+        let mut lights: BTreeMap<usize, Vec<(LightProperty, [f32; 4])>> = BTreeMap::new();
+        let mut cameras = BTreeMap::new();
+        let mut has_switches = false;
+        for channel in &playing.values {
+            let value = channel.value(seconds);
+            match channel.target {
+                Target::Material(k, property) => materials.entry(k).or_default().push((property, value)),
+                Target::Light(k, property) => lights.entry(k).or_default().push((property, value)),
+                Target::Visibility(_) => has_switches = true,
+                Target::Camera(k, property) => {
+                    for i in &self.parts.animated_cameras[k] {
+                        let Some(rest) = self.rest_cameras.get(*i) else { continue };
+                        property.set(cameras.entry(*i).or_insert_with(|| rest.clone()), f64::from(value[0]));
+                    }
+                }
+            }
+        }
+
+        // materials, and those that are one of them in the variant of the scene
+        for (k, values) in materials {
+            let animated = &self.parts.materials[k];
+            let rest = animated.materials.iter().filter_map(|i| Some((*i, self.rest_materials.get(i)?)));
+            pose.materials.extend(rest.map(|(i, rest)| (i, animated.changed(rest, &values))));
+        }
+        for (i, variants) in &self.varied {
+            let source = variants.material(self.variant);
+            if let Some((_, material)) = pose.materials.iter().find(|(k, _)| *k == source) {
+                let copy = Material { variants: Some(variants.clone()), ..material.clone() };
+                pose.materials.push((*i, copy));
+            }
+        }
+
+        // lights, black where they are hidden
+        let is_hidden = self.hidden(Some((playing, seconds)));
+        let mut changed: BTreeMap<usize, Light> = BTreeMap::new();
+        for (k, values) in lights {
+            let animated = &self.parts.animated_lights[k];
+            let rest = animated.lights.iter().filter_map(|i| Some((*i, self.rest_lights.get(*i)?)));
+            changed.extend(rest.map(|(i, rest)| (i, animated.changed(rest, &values))));
+        }
+        for &(i, node) in &self.parts.switched_lights {
+            if (has_switches || changed.contains_key(&i))
+                && let Some(rest) = self.rest_lights.get(i)
+            {
+                let light = changed.entry(i).or_insert_with(|| rest.clone());
+                if is_hidden[node] {
+                    light.intensity = glam::Vec3::ZERO;
+                }
+            }
+        }
+        pose.light_values.extend(changed);
+
+        // cameras and instances
+        pose.lenses.extend(cameras.into_iter().map(|(i, camera)| (i, camera.projection, camera.clip)));
+        if has_switches {
+            pose.hidden.extend(self.parts.switched_instances.iter().map(|&(i, node)| (i, is_hidden[node])));
+        }
+    }
+
+    /// Returns true if an animation changes lights or materials that emit, or hides what may emit.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is no such animation.
+    pub fn changes_light(&self, animation: usize) -> Result<bool> {
+        let playing = self.live(animation, &mut Vec::new())?;
+        Ok(playing.values.iter().any(|channel| {
+            matches!(
+                channel.target,
+                Target::Light(..)
+                    | Target::Visibility(_)
+                    | Target::Material(_, MaterialProperty::EmissiveFactor | MaterialProperty::EmissiveStrength)
+            )
+        }))
     }
 
     /// The cameras that an animation moves, as indices into [`Scene::cameras`].
@@ -209,6 +404,15 @@ impl AnimationRig {
             count += 1;
         }
         pose.meshes.truncate(count);
+
+        // what is no transform
+        pose.materials.clear();
+        pose.light_values.clear();
+        pose.lenses.clear();
+        pose.hidden.clear();
+        if !playing.values.is_empty() {
+            self.pose_values(playing, seconds, pose);
+        }
         Ok(())
     }
 
@@ -248,6 +452,7 @@ impl AnimationRig {
         self.spread(&mut live);
         let mut moving = vec![false; count];
         self.moved(&self.parts.instances, &live).for_each(|(i, _)| moving[i] = true);
+        self.parts.switched_instances.iter().for_each(|(i, _)| moving[*i] = true);
         moving
     }
 
@@ -370,7 +575,31 @@ impl AnimationRig {
                 light.place(&rigid(&rig.rest[node]));
             }
         }
+        rig.keep_rest_values(scene);
         scene.rig = Some(rig);
+    }
+}
+
+impl AnimationRig {
+    /// Keeps the materials, lights and cameras of the scene as they are at rest, and hides what is
+    /// hidden then.
+    fn keep_rest_values(&mut self, scene: &mut Scene) {
+        let animated = self.parts.materials.iter().flat_map(|m| &m.materials);
+        let material = |&i: &usize| Some((i, scene.materials.get(i)?.clone()));
+        self.rest_materials = animated.filter_map(material).collect();
+        let variants = |(i, m): (usize, &Material)| Some((i, m.variants.clone()?));
+        self.varied = scene.materials.iter().enumerate().filter_map(variants).collect();
+        self.rest_lights.clone_from(&scene.lights);
+        self.rest_cameras.clone_from(&scene.cameras);
+
+        let is_hidden = self.hidden(None);
+        let instances = self.parts.switched_instances.iter();
+        scene.hidden = instances.filter(|(_, node)| is_hidden[*node]).map(|(i, _)| *i).collect();
+        for &(i, node) in &self.parts.switched_lights {
+            if let Some(light) = scene.lights.get_mut(i).filter(|_| is_hidden[node]) {
+                light.intensity = glam::Vec3::ZERO;
+            }
+        }
     }
 }
 

@@ -90,7 +90,12 @@ pub fn parade() -> Scene {
     // the second animation has the bending alone
     let bends =
         stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
-    let animation = |name: &str, channels| Animation { name: name.to_owned(), duration: DURATION, channels };
+    let animation = |name: &str, channels| Animation {
+        name: name.to_owned(),
+        duration: DURATION,
+        channels,
+        ..Animation::default()
+    };
     stage.parts.animations = vec![animation("parade", std::mem::take(&mut stage.channels)), animation("bend", bends)];
     // valid by construction; otherwise the scene has no rig, and tests fail
     let _ = AnimationRig::attach(&mut scene, stage.parts);
@@ -115,7 +120,7 @@ impl RigBuilder {
 
     fn node_scaled(&mut self, name: &str, parent: Option<usize>, translation: DVec3, scale: f64) -> usize {
         let local = LocalTransform::Trs { translation, rotation: DQuat::IDENTITY, scale: DVec3::splat(scale) };
-        self.parts.nodes.push(Node { name: name.to_owned(), parent, local, weights: Vec::new() });
+        self.parts.nodes.push(Node { name: name.to_owned(), parent, local, ..Node::default() });
         self.parts.nodes.len() - 1
     }
 

@@ -53,7 +53,8 @@ pub fn pendulum() -> Scene {
         values: (0..KEYS).flat_map(turn).collect(),
     };
     let channels = vec![Channel { node: 0, property: Property::Rotation, sampler }];
-    parts.animations = vec![Animation { name: "swing".to_owned(), duration: DURATION, channels }];
+    parts.animations =
+        vec![Animation { name: "swing".to_owned(), duration: DURATION, channels, ..Animation::default() }];
     // valid by construction; otherwise the scene has no rig, and tests fail
     let _ = AnimationRig::attach(&mut scene, parts);
     scene

@@ -24,7 +24,7 @@ use crate::scene::{
 /// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras,
 /// punctual lights and animations with skins and morph targets survive a round trip through the
 /// loader (animated scenes are written in their rest pose). Spheres are tessellated, with a
-/// warning; what glTF cannot express (the environment, render settings, the `.brhan` kind of a
+/// warning, and animations of other values are left out, with another; what glTF cannot express (the environment, render settings, the `.brhan` kind of a
 /// material) is left out.
 ///
 /// # Errors
@@ -165,6 +165,18 @@ impl Writer {
         if let Some(rig) = rig {
             skins.extend(rig.parts().skins.iter().map(|s| self.skin(s)));
             animations.extend(rig.animations().iter().map(|a| self.animation(a, rig, &tree)));
+            let values: usize = rig.animations().iter().map(|a| a.values.len()).sum();
+            if values > 0 {
+                self.written.warnings.push(format!(
+                    "{values} animation channels are left out, of materials, lights, cameras and visibility: skylit writes those of transforms and morph targets"
+                ));
+            }
+
+            // what is hidden at rest stays so
+            for (node, written) in rig.parts().nodes.iter().zip(&mut nodes).filter(|(node, _)| node.hidden) {
+                used.insert("KHR_node_visibility");
+                written["extensions"]["KHR_node_visibility"] = json!({ "visible": !node.hidden });
+            }
         }
 
         let mut json = json!({

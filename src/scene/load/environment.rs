@@ -65,6 +65,27 @@ pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Resul
     })
 }
 
+/// An environment map of the faces of a cube, each `side` texels along an edge, in the order of
+/// [`load_environment`]: rows from the top of each, as OpenGL has faces (OpenGL 4.6, table 8.19).
+///
+/// # Errors
+/// Where a file may not take the memory for it, in words.
+pub(super) fn of_faces(
+    name: &str,
+    side: u32,
+    faces: [Vec<Vec3>; 6],
+    budget: &Budget,
+) -> std::result::Result<EnvironmentMap, String> {
+    let pixel_count = 8 * u64::from(side) * u64::from(side);
+    budget.take(pixel_count * DEVICE_BYTES, || format!("a cube of {side}x{side} texels"))?;
+    let pixels = |radiance: Vec<Vec3>| {
+        let radiance = radiance.into_iter().map(|c| Vec3::from_array(c.to_array().map(admissible))).collect();
+        Pixels { width: side, height: side, radiance, warning: None }
+    };
+    let Pixels { width, height, radiance, .. } = cube::resample(&faces.map(pixels));
+    Ok(EnvironmentMap { name: name.to_owned(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY })
+}
+
 /// One image, of the kind that its first bytes show.
 fn read(path: &Path, budget: &Budget) -> Result<Pixels> {
     let start = files::read_start(path)?;

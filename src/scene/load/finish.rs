@@ -11,7 +11,7 @@ use super::{normals, ranges, tangents, vertices};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::MAX_COORDINATE;
-use crate::scene::animation::Deformation;
+use crate::scene::animation::{Deformation, renumbered};
 use crate::scene::material::{VariantMaterials, all_variants};
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
@@ -298,6 +298,8 @@ fn retain_instances(scene: &mut Scene, keep: &[bool]) {
     }
     let mut each = keep.iter();
     scene.instances.retain(|_| each.next().copied().unwrap_or(true));
+    let number = renumbered(keep);
+    scene.hidden = scene.hidden.iter().filter(|i| keep[**i]).map(|i| number[*i]).collect();
     if let Some(rig) = &mut scene.rig {
         rig.keep_instances(keep);
     }

@@ -27,6 +27,10 @@ pub(in super::super) struct LightBuilder {
     pub(super) alpha: Vec<AlphaClass>,
     /// For each instance: it moves or deforms.
     pub(super) moves: Vec<bool>,
+    /// Lights of the scene that become dark and bright again.
+    pub(super) changing: Vec<usize>,
+    /// Materials that emit at times.
+    pub(super) emitters: Vec<usize>,
     /// Means of the textures of emitters, by index.
     pub(super) means: HashMap<Option<usize>, Vec4>,
     /// Number of parts along an edge of each triangle with a picture.
@@ -34,6 +38,10 @@ pub(in super::super) struct LightBuilder {
     /// Parts of each triangle of the meshes with a picture, by mesh.
     pub(super) parts: HashMap<usize, Vec<Vec<Part>>>,
 }
+
+/// Brightness of a light that is dark at a time: it stays in the list, so that shaders that were
+/// compiled for it fit, and gets next to no samples.
+pub(super) const DARK: f64 = 1e-20;
 
 /// Collects lights: placed ones with their bounds, then distant ones with the weights by which they
 /// are chosen.

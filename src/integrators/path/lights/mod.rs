@@ -99,13 +99,18 @@ impl LightBuilder {
     /// sphere.
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
         let scene = flat.scene;
-        let moves =
-            |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
+        // what changes its emission is one light a triangle, as what moves is
+        let changes = |mesh: usize| flat.motion.materials.contains_key(&scene.meshes[mesh].material);
+        let moves = |(k, mesh): (usize, usize)| {
+            flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh) || changes(mesh)
+        };
         let moves: Vec<bool> = scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect();
         Self {
             origin: flat.origin,
             environment,
-            alpha: alpha_classes(scene, flat.blend),
+            alpha: alpha_classes(scene, &flat.motion, flat.blend),
+            changing: flat.motion.lights.clone(),
+            emitters: emitters(flat),
             means: HashMap::new(),
             side: pictures::side(pictures::count_triangles(scene, &moves)),
             parts: HashMap::new(),
@@ -117,7 +122,10 @@ impl LightBuilder {
     /// at times.
     pub fn moving_kinds(&self, scene: &Scene) -> impl Iterator<Item = Kind> {
         let is_sphere = |mesh: usize| matches!(scene.meshes[mesh].geometry, Geometry::Spheres(_));
-        let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emissive != Vec3::ZERO;
+        let emits = |mesh: usize| {
+            let material = scene.meshes[mesh].material;
+            scene.materials[material].emissive != Vec3::ZERO || self.emitters.contains(&material)
+        };
         let moving = scene.instances.iter().zip(&self.moves).filter(|(_, moves)| **moves).map(|(i, _)| i.mesh);
         moving.filter(move |&mesh| is_sphere(mesh) && emits(mesh)).map(|_| Kind::Sphere)
     }
@@ -126,7 +134,8 @@ impl LightBuilder {
     pub fn lights(&mut self, scene: &Scene) -> Lights {
         let mut all = LightCollector::default();
         let is_far = |light: &&Light| matches!(light.kind.emission(), Emission::Distant { .. });
-        scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, self, l));
+        let punctual = || scene.lights.iter().enumerate();
+        punctual().filter(|(_, l)| !is_far(l)).for_each(|(k, l)| punctual::add(&mut all, self, l, k));
         let light_of = surfaces::add(&mut all, self, scene);
         let placed = all.records.len();
         let evenly = CumulativeTable::new(&all.even_shares);
@@ -143,7 +152,7 @@ impl LightBuilder {
         } else {
             lights.tree.push(light_tree::no_lights());
         }
-        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, self, l));
+        punctual().filter(|(_, l)| is_far(l)).for_each(|(k, l)| punctual::add(&mut all, self, l, k));
         lights.directional = placed as u32..all.records.len() as u32;
         lights.has_disks = all.records[placed..].iter().any(|r| r.radius > 0.0);
         let directional = all.weights.len();
@@ -161,6 +170,12 @@ impl LightBuilder {
         lights.starts.extend(table.starts);
         lights
     }
+}
+
+/// Materials that emit at some time of an animation that changes them.
+fn emitters(flat: &FlatScene) -> Vec<usize> {
+    let emits = |k: &usize| flat.motion.states(flat.scene, *k).any(|m| m.emissive != Vec3::ZERO && !m.unlit);
+    flat.motion.materials.keys().copied().filter(emits).collect()
 }
 
 /// Probabilities of distant lights, of which the first `directional` are directional lights and the

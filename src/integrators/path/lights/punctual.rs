@@ -6,15 +6,17 @@ use glam::DVec3;
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
+use super::collect::DARK;
 use super::{LightBuilder, LightCollector, brightness};
 use crate::interface::records::lights::LightRecord;
 use crate::scene::Light;
 use crate::scene::lights::Emission;
 
-/// Adds a light.
-pub(super) fn add(all: &mut LightCollector, builder: &LightBuilder, light: &Light) {
+/// Adds a light, which is light `index` of its scene.
+pub(super) fn add(all: &mut LightCollector, builder: &LightBuilder, light: &Light, index: usize) {
     let position = light.position - builder.origin;
-    let brightness = brightness(light.intensity);
+    let least = if builder.changing.contains(&index) { DARK } else { 0.0 };
+    let brightness = brightness(light.intensity).max(least);
     let base = LightRecord {
         kind: light.kind.number() as u32,
         position: position.as_vec3().to_array(),

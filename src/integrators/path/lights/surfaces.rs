@@ -6,6 +6,7 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
+use super::collect::DARK;
 use super::pictures::{Part, Picture};
 use super::{LightBuilder, LightCollector, brightness};
 use crate::accel::features::AlphaClass;
@@ -19,7 +20,7 @@ const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 /// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a
 /// non-uniform scale has no closed form: only BSDF sampling finds it.
 pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &Scene) -> Vec<u32> {
-    let LightBuilder { origin, alpha, moves, means, side, parts, .. } = builder;
+    let LightBuilder { origin, alpha, moves, means, side, parts, emitters, .. } = builder;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
 
     // what emits and is there
@@ -28,26 +29,34 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
         let material = &scene.materials[mesh.material];
         // unlit surfaces are visible but illuminate nothing; surfaces that no ray can hit are
         // neither
-        if material.emissive == Vec3::ZERO || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
+        let changes = emitters.contains(&mesh.material);
+        let is_dark = material.emissive == Vec3::ZERO && !changes;
+        if is_dark || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
             continue;
         }
+        // a hidden one stays in the list if it may be shown again, and is dark
+        let hidden = scene.hidden.contains(&i);
+        if hidden && !moves[i] {
+            continue;
+        }
+        let emissive = if hidden { Vec3::ZERO } else { material.emissive };
         let to_world = instance.object_to_world;
         let base = LightRecord {
-            intensity: material.emissive.to_array(),
+            intensity: emissive.to_array(),
             instance: i as u32,
             flags: if material.double_sided { LIGHT_TWO_SIDED } else { 0 },
             ..Default::default()
         };
         let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(scene, texture));
-        let of_textures =
-            brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let of_textures = brightness(emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
         let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
         let alpha_factor = if is_tested {
             mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w)
         } else {
             1.0
         };
-        let brightness = of_textures * alpha_factor;
+        let least = if hidden || changes { DARK } else { 0.0 };
+        let brightness = (of_textures * alpha_factor).max(least);
 
         // its lights, one or more a primitive
         let first = of_primitives.len();

@@ -152,6 +152,7 @@ impl Loader<'_> {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);
                 model.rig = None;
+                model.instances = model.shown_instances().cloned().collect();
                 let file = text::shown(file);
                 self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
             }

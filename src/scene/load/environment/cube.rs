@@ -28,11 +28,19 @@ pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Pixels> {
             format!("face {} is {w}x{h}, not {side}x{side}: all faces must be square and of one size", FACES[k]),
         ));
     }
+    let mut pixels = resample(&faces);
+    let warnings: Vec<String> = faces.into_iter().filter_map(|f| f.warning).collect();
+    pixels.warning = (!warnings.is_empty()).then(|| warnings.join("; "));
+    Ok(pixels)
+}
+
+/// Resamples six square faces of one size.
+pub(super) fn resample(faces: &[Pixels]) -> Pixels {
+    let side = faces[0].width;
     let (width, height) = ((4 * side).min(MAX_SIDE), (2 * side).min(MAX_SIDE / 2));
     let radiance =
-        (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(&faces, [width, height], k)).collect();
-    let warnings: Vec<String> = faces.into_iter().filter_map(|f| f.warning).collect();
-    Ok(Pixels { width, height, radiance, warning: (!warnings.is_empty()).then(|| warnings.join("; ")) })
+        (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(faces, [width, height], k)).collect();
+    Pixels { width, height, radiance, warning: None }
 }
 
 fn face(folder: &Path, name: &str, budget: &Budget) -> Result<Pixels> {

@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use ::gltf::json::extensions::texture::TextureTransform;
 use ::gltf::json::material::{self as json, AlphaMode as JsonAlphaMode};
 use ::gltf::json::texture::Info;
-use glam::{Affine2, Mat2, Vec2, Vec3, Vec4};
+use glam::{Affine2, Vec3, Vec4};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::glossiness::{RoughnessTexture, SpecularGlossiness};
 use super::values::{text, valid};
+use crate::scene::animation;
 use crate::scene::material::{
     AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Material, Retroreflection, Sheen, Specular,
     TextureSlot, Transmission, VolumeScatter,
@@ -135,13 +136,10 @@ impl UnmodelledExtension for TextureTransform {
     const NAME: &str = "KHR_texture_transform";
 }
 
-/// `translation * rotation * scale` of the extension. Its rotation is counter-clockwise as seen in
-/// an image whose v points down, hence the signs.
+/// Transform of texture coordinates.
 fn affine(t: &TextureTransform) -> Affine2 {
-    let (s, c) = t.rotation.0.sin_cos();
-    let rotation = Mat2::from_cols(Vec2::new(c, -s), Vec2::new(s, c));
-    let scale = Mat2::from_diagonal(t.scale.0.into());
-    Affine2::from_mat2_translation(rotation * scale, t.offset.0.into())
+    let (offset, scale) = (t.offset.0.into(), t.scale.0.into());
+    animation::TextureTransform { offset, rotation: t.rotation.0, scale }.affine()
 }
 
 /// A slot, with the index of the glTF texture, not yet of the scene's.

@@ -15,10 +15,12 @@ mod compressed;
 mod container;
 mod decoded;
 mod glossiness;
+mod image_light;
 mod instancing;
 mod material;
 mod mesh;
 mod node;
+mod pointer;
 mod rig;
 mod skin;
 mod texture;
@@ -46,9 +48,11 @@ use crate::scene::{FileExtension, Geometry, Instance, Material, Mesh, Scene};
 
 /// Extensions that skylit reads, and whether this program was built with what they need.
 const KNOWN: &[(&str, bool)] = &[
+    ("EXT_lights_image_based", true),
     ("EXT_mesh_gpu_instancing", true),
     ("EXT_meshopt_compression", cfg!(feature = "meshopt")),
     ("EXT_texture_webp", true),
+    ("KHR_animation_pointer", true),
     ("KHR_draco_mesh_compression", cfg!(feature = "draco")),
     ("KHR_lights_punctual", true),
     ("KHR_materials_anisotropy", true),
@@ -109,6 +113,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         texture::resolve(&reader, path, &mut scene.materials, &made, loading, &mut |w| warnings.push(w));
 
     scene.variants = variants::names(&document).map_err(input)?;
+    image_light::apply(&reader, path, chosen, loading, &mut scene, &mut |w| warnings.push(w));
 
     // nodes, and what they carry
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
@@ -123,7 +128,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
         let name = text(&node.name);
-        if let Some(index) = node.mesh.filter(|_| placed.visible) {
+        if let Some(index) = node.mesh.filter(|_| stage.shows(at)) {
             let copies = instancing::read(&reader, node).map_err(|e| input(format!("node {}: {e}", placed.node)))?;
             if node.skin.is_some() && instancing::is_instanced(node) {
                 warnings.push(format!("node {} has instances and a skin: shown once", placed.node));
@@ -141,7 +146,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
                 };
                 for (object_to_world, carrier) in places {
                     scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
-                    stage.instances.push(carrier);
+                    stage.add_instance(at, carrier);
                 }
             }
         }
@@ -150,21 +155,25 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
                 Ok(camera) => {
                     scene.cameras.push(camera);
                     stage.cameras.push(Some(at));
+                    stage.camera_numbers.push(index.value());
                 }
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
-        if let Some(light) = light.filter(|_| placed.visible) {
-            match node::light(&document, placed, light.light.value()) {
+        if let Some(light) = light.filter(|_| stage.shows(at)) {
+            let number = light.light.value();
+            match node::light(&document, placed, number) {
                 Ok(light) => {
                     scene.lights.push(light);
                     stage.lights.push(Some(at));
+                    stage.light_numbers.push(number);
                 }
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }
         }
     }
+    stage.material_copies = meshes.with_sets.iter().map(|((of, _), copy)| (*copy, *of)).collect();
     stage.finish(&mut scene).map_err(input)?;
     scene.report.warnings.append(&mut warnings);
     Ok(scene)

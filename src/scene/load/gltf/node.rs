@@ -178,7 +178,7 @@ pub(super) fn place(
 }
 
 /// Returns true if a node says that it and all below it are not to be seen.
-fn is_hidden(node: &Node) -> bool {
+pub(super) fn is_hidden(node: &Node) -> bool {
     let visibility = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
     visibility.and_then(|v| v.get("visible")?.as_bool()) == Some(false)
 }

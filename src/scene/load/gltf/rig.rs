@@ -4,14 +4,15 @@
 use std::collections::BTreeMap;
 
 use ::gltf::json::mesh::Primitive;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::accessor::Reader;
-use super::node::{Doubles, PlacedNode};
+use super::node::{Doubles, PlacedNode, is_hidden};
 use super::values::text;
-use super::{animation, skin};
+use super::{animation, pointer, skin};
 use crate::scene::animation::{
-    Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor,
+    AnimatedLight, Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, Target, VertexData, anchor,
+    renumbered,
 };
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
@@ -68,6 +69,16 @@ pub(super) struct RigBuilder<'a> {
     pub cameras: Vec<Option<usize>>,
     /// The placed node of each light.
     pub lights: Vec<Option<usize>>,
+    /// For each placed node, whether an animation may hide or show it, itself or by a node above.
+    switched: Vec<bool>,
+    /// Instances on such nodes, and the node of each.
+    pub switched_instances: Vec<(usize, usize)>,
+    /// Number in the file of each camera.
+    pub camera_numbers: Vec<usize>,
+    /// Number in the file of each light.
+    pub light_numbers: Vec<usize>,
+    /// Materials of the scene that are copies of ones of the file: which, and of which.
+    pub material_copies: Vec<(usize, usize)>,
 }
 
 impl<'a> RigBuilder<'a> {
@@ -104,7 +115,8 @@ impl<'a> RigBuilder<'a> {
             let room = reader.budget.take(16 * count as u64, || format!("a node with {count} morph targets"));
             weights.resize(if room.is_ok() { count } else { 0 }, 0.0);
             weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
-            Node { name: text(&node.name).to_owned(), parent: p.parent, local, weights }
+            let hidden = is_hidden(node);
+            Node { name: text(&node.name).to_owned(), parent: p.parent, local, weights, hidden }
         };
         let nodes: Vec<Node> = placed.iter().map(node).collect();
         for node in taken_apart {
@@ -118,7 +130,12 @@ impl<'a> RigBuilder<'a> {
             let which = if channel.property == Property::Weights { &mut morphs } else { &mut moves };
             which[channel.node] = true;
         }
+        let mut switched = vec![false; nodes.len()];
+        for node in pointer::switched_nodes(document, animation::pointers(&doubles.animations)) {
+            index[node].into_iter().for_each(|at| switched[at] = true);
+        }
         for (at, node) in nodes.iter().enumerate() {
+            switched[at] |= node.parent.is_some_and(|p| switched[p]);
             moves[at] |= node.parent.is_some_and(|p| moves[p]);
         }
 
@@ -137,7 +154,26 @@ impl<'a> RigBuilder<'a> {
             instances: Vec::new(),
             cameras: Vec::new(),
             lights: Vec::new(),
+            switched,
+            switched_instances: Vec::new(),
+            camera_numbers: Vec::new(),
+            light_numbers: Vec::new(),
+            material_copies: Vec::new(),
         }
+    }
+
+    /// Whether what placed node `at` carries is in the scene: it is visible, or an animation may
+    /// show it.
+    pub fn shows(&self, at: usize) -> bool {
+        self.placed[at].visible || self.switched[at]
+    }
+
+    /// Notes an instance that placed node `at` shows.
+    pub fn add_instance(&mut self, at: usize, carrier: Option<usize>) {
+        if self.switched[at] {
+            self.switched_instances.push((self.instances.len(), at));
+        }
+        self.instances.push(carrier);
     }
 
     /// The node that carries a copy of what placed node `at` shows: one of its own below that node
@@ -147,7 +183,7 @@ impl<'a> RigBuilder<'a> {
             return None;
         }
         let local = LocalTransform::Matrix(*copy);
-        self.nodes.push(Node { name: String::new(), parent: Some(at), local, weights: Vec::new() });
+        self.nodes.push(Node { parent: Some(at), local, ..Node::default() });
         Some(self.nodes.len() - 1)
     }
 
@@ -254,6 +290,8 @@ impl<'a> RigBuilder<'a> {
         let mut keep = vec![false; self.nodes.len()];
         let joints = self.deformations.iter().filter_map(|d| d.skin).flat_map(|s| &self.skins[&s].joints).copied();
         let carried = self.instances.iter().chain(&self.cameras).chain(&self.lights).flatten().copied();
+        let switching = self.switched_instances.iter().map(|(_, at)| *at);
+        let carried = carried.chain(switching);
         for at in carried.chain(joints).chain(self.deformations.iter().map(|d| d.node)) {
             keep[at] = true;
         }
@@ -266,12 +304,7 @@ impl<'a> RigBuilder<'a> {
         }
 
         // nodes that are kept are numbered anew, and so is what refers to them
-        let mut next = 0;
-        let count = |&keep: &bool| {
-            next += usize::from(keep);
-            next - usize::from(keep)
-        };
-        let number: Vec<usize> = keep.iter().map(count).collect();
+        let number = renumbered(&keep);
         for node in &mut self.nodes {
             node.parent = node.parent.map(|p| number[p]);
         }
@@ -280,7 +313,14 @@ impl<'a> RigBuilder<'a> {
         for animation in &mut self.animations {
             animation.channels.retain(|c| keep[c.node]);
             animation.channels.iter_mut().for_each(|c| c.node = number[c.node]);
+            animation.values.retain(|c| !matches!(c.target, Target::Visibility(at) if !keep[at]));
         }
+        let switched_lights: Vec<(usize, usize)> =
+            self.lights.iter().enumerate().filter_map(|(i, at)| Some((i, (*at)?))).collect();
+        let switched_lights = switched_lights.into_iter().filter(|(_, at)| self.switched[*at]);
+        let switched_lights = switched_lights.map(|(i, at)| (i, number[at])).collect();
+        let switched_instances = self.switched_instances.iter().map(|(i, at)| (*i, number[*at])).collect();
+        let values = self.animated_values(&number);
 
         let mut skins = Vec::new();
         let mut names = BTreeMap::new();
@@ -305,9 +345,60 @@ impl<'a> RigBuilder<'a> {
             instances: renumber(self.instances),
             cameras: renumber(self.cameras),
             lights: renumber(self.lights),
+            switched_instances,
+            switched_lights,
+            ..values
         };
         scene.rig = Some(AnimationRig::new(scene, parts)?);
         Ok(())
+    }
+}
+
+impl RigBuilder<'_> {
+    /// The materials, lights and cameras that channels change, which refer to them from then on and
+    /// no longer to those of the file. `number`: the new index of each node.
+    fn animated_values(&mut self, number: &[usize]) -> RigParts {
+        let document = self.reader.document;
+        let (mut materials, mut lights, mut cameras) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let mut parts = RigParts::default();
+        let with_number = |numbers: &[usize], k: usize| -> Vec<usize> {
+            numbers.iter().enumerate().filter(|(_, n)| **n == k).map(|(i, _)| i).collect()
+        };
+        for channel in self.animations.iter_mut().flat_map(|a| &mut a.values) {
+            channel.target = match channel.target {
+                Target::Visibility(at) => Target::Visibility(number[at]),
+                Target::Material(k, property) => {
+                    let index = *materials.entry(k).or_insert_with(|| {
+                        let copies = self.material_copies.iter().filter(|(_, of)| *of == k).map(|(i, _)| *i);
+                        let all = std::iter::once(k).chain(copies).collect();
+                        parts.materials.push(pointer::animated_material(&document.materials[k], all));
+                        parts.materials.len() - 1
+                    });
+                    Target::Material(index, property)
+                }
+                Target::Light(k, property) => {
+                    let index = *lights.entry(k).or_insert_with(|| {
+                        let file = document.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+                        let light = file.and_then(|l| l.lights.get(k));
+                        parts.animated_lights.push(AnimatedLight {
+                            lights: with_number(&self.light_numbers, k),
+                            color: light.map_or(Vec3::ONE, |l| Vec3::from(l.color)),
+                            intensity: light.map_or(1.0, |l| l.intensity),
+                        });
+                        parts.animated_lights.len() - 1
+                    });
+                    Target::Light(index, property)
+                }
+                Target::Camera(k, property) => {
+                    let index = *cameras.entry(k).or_insert_with(|| {
+                        parts.animated_cameras.push(with_number(&self.camera_numbers, k));
+                        parts.animated_cameras.len() - 1
+                    });
+                    Target::Camera(index, property)
+                }
+            };
+        }
+        parts
     }
 }
 

@@ -126,7 +126,11 @@ fn source(texture: &json::Texture) -> Option<usize> {
         .or_else(|| Some(texture.source.value()).filter(|&s| s != NO_SOURCE))
 }
 
-fn image(reader: &Reader, path: &Path, loading: Loading, index: usize) -> Result<DecodedImage, String> {
+/// Decodes an image of the document.
+///
+/// # Errors
+/// What is wrong, in words that follow its name.
+pub(super) fn image(reader: &Reader, path: &Path, loading: Loading, index: usize) -> Result<DecodedImage, String> {
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
         (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name), reader.budget),
