@@ -20,9 +20,10 @@ pub struct FilmOptions {
     /// Stop sampling tiles whose standard error is at most this, tested at powers of two of samples
     /// from [`FIRST_CHECK`] on. The samples per pixel are then the maximum.
     pub target_rmse: Option<f64>,
-    /// Stop sampling tiles whose displayed error is at most this, tested at powers of two of samples
-    /// from 2 * [`FIRST_DISPLAY_CHECK`] on. It prevails over `target_rmse`, and the samples per
-    /// pixel are the maximum. A film that is resumed does not know its last check, and takes more.
+    /// Stop sampling tiles whose displayed error is at most this, tested at powers of two of
+    /// samples from 2 * [`FIRST_DISPLAY_CHECK`] on. It prevails over `target_rmse`, and the samples
+    /// per pixel are the maximum. A film that is resumed does not know its last check, and takes
+    /// more.
     pub display_target: Option<DisplayTarget>,
 }
 

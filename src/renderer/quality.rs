@@ -114,7 +114,7 @@ impl QualityReport {
         let Some((&most, _)) = self.tiles.last_key_value() else { return Vec::new() };
         let counts: Vec<_> = self.tiles.iter().map(|(samples, tiles)| format!("{tiles} with {samples}")).collect();
         vec![format!(
-            "{:.1} % of the samples that {most} in every pixel would be not taken: displayed tiles have little noise; tiles by samples per pixel: {}",
+            "{:.1} % fewer samples than {most} in every pixel: tiles that a display shows without noise have enough; tiles by samples per pixel: {}",
             100.0 * (1.0 - self.mean_samples / f64::from(most.max(1))),
             counts.join(", ")
         )]

@@ -221,10 +221,10 @@ settings! {
         /// Adaptive sampling: stop sampling an 8x8 tile once its estimated standard error and its neighbours' are at most E (radiance), tested at powers of two
         /// from 64 samples on. --spp is then the maximum
         target_rmse: Option<f64>, option(value_name = "E", value_parser = parse_target, allow_hyphen_values = true), applies(AppliesTo::STILLS);
-        /// As many samples as a display needs: draft, good or final, in place of --spp
+        /// As many samples as a display needs: draft, good or final
         ///
         /// Tiles of 8x8 pixels are sampled until the noise that a display shows of them is at most 4/255 (draft), 2/255 (good) or 1/255 (final) of sRGB values,
-        /// with at most 256, 1024 or 4096 samples per pixel. The error that was reached is printed.
+        /// with at most 256, 1024 or 4096 samples per pixel; --spp is left out. The error that was reached is printed.
         quality: Option<Quality>, option(value_name = "NAME", value_enum, hide_possible_values = true, help_heading = "Image"), applies(DENOISED), basic;
     }
 }
@@ -492,7 +492,8 @@ impl RenderSettings {
         if self.is_still_sequence() { None } else { self.frames.given().into_iter().next() }
     }
 
-    /// Returns true for stills, one per frame: `spp` or a quality, and nothing that only real-time frames have.
+    /// Returns true for stills, one per frame: `spp` or a quality, and nothing that only real-time
+    /// frames have.
     pub fn is_still_sequence(&self) -> bool {
         let given = self.frames.given();
         (self.image.spp.is_some() || self.film.quality.is_some())

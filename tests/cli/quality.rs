@@ -31,11 +31,18 @@ fn tile_errors(a: &[f64], b: &[f64]) -> Vec<f64> {
     sums.into_iter().map(f64::sqrt).collect()
 }
 
+/// The tile whose corner a record names.
+fn tile_of(corner: &Value) -> usize {
+    let [x, y] = [0, 1].map(|k| corner[k].as_u64().unwrap() as usize);
+    assert!(x % 8 == 0 && y % 8 == 0 && x < SIZE[0] && y < SIZE[1], "{corner}");
+    y / 8 * (SIZE[0] / 8) + x / 8
+}
+
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Qualities are ordered by what they leave and by what they cost, and what is announced is there: the error of the image
+/// Qualities are ordered by what they leave and what they cost, and what is announced is there: the error of the image
 /// and, but for tiles that are named, of each tile.
 #[test]
 fn gpu_a_quality_is_what_it_announces() {
@@ -54,7 +61,10 @@ fn gpu_a_quality_is_what_it_announces() {
                 |path: &str| film.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {film}"));
             let errors = tile_errors(&pixels, &reference);
             let (error, announced, samples) = (rms(&errors), 255.0 * number("/quality/error"), number("/samples/mean"));
-            let worst = errors.iter().copied().fold(0.0, f64::max);
+            let limited: Vec<usize> =
+                film["quality"]["limited_tiles"].as_array().unwrap().iter().map(tile_of).collect();
+            let reached = (0..TILES).filter(|tile| !limited.contains(tile)).map(|tile| errors[tile]);
+            let worst = reached.fold(0.0, f64::max);
             println!(
                 "{scene:?} {quality}: error {error:.3}, announced {announced:.3}, worst tile {worst:.3}, {samples} samples"
             );
@@ -62,11 +72,10 @@ fn gpu_a_quality_is_what_it_announces() {
 
             // the image is within its bound, and the estimate within its own uncertainty: it is too large where samples
             // are stratified, which is what ambient occlusion gains most by
-            let limited = film["quality"]["limited_tiles"].as_array().unwrap();
-            assert!(limited.is_empty() && error < bound && announced <= bound, "{film}");
+            assert!(error < bound && announced < bound, "{film}");
             assert!((0.8..1.6).contains(&(announced / error)), "announced {announced}, found {error}");
             // an estimate from 64 pixels is off by a tenth, and the reference has noise, too
-            assert!(worst < 1.5 * bound, "a tile with {worst}: {film}");
+            assert!(worst < 1.5 * bound && limited.len() <= 2, "a tile with {worst}: {film}");
 
             // the next one leaves less, and costs more
             if let Some([more, fewer]) = before.replace([error, samples]) {
@@ -89,7 +98,7 @@ fn gpu_quiet_tiles_have_fewer_samples() {
     let (record, _) = render(&scene, &["--quality", "draft", "--explain", "--validation"], &exr);
     let film = &record["film"];
     let number = |name: &str| film["samples"][name].as_f64().unwrap();
-    assert!(number("min") <= 32.0 && number("max") == 256.0 && number("mean") < 200.0, "{film}");
+    assert!(number("min") <= 64.0 && number("max") == 256.0 && number("mean") < 230.0, "{film}");
     assert_eq!(record["spp_asked"], 256);
     assert_eq!(record["stopped_early"], false);
 
@@ -100,8 +109,8 @@ fn gpu_quiet_tiles_have_fewer_samples() {
     let limited = film["quality"]["limited_tiles"].as_array().unwrap();
     assert!(!limited.is_empty() && limited.len() < TILES, "{film}");
     for tile in limited {
-        let [x, y] = [0, 1].map(|k| tile[k].as_u64().unwrap() as usize);
-        assert!(x % 8 == 0 && y % 8 == 0 && samples[y * SIZE[0] + x] == 256.0, "{tile}");
+        let (tile, width) = (tile_of(tile), SIZE[0] / 8);
+        assert_eq!(samples[8 * (tile / width) * SIZE[0] + 8 * (tile % width)], 256.0);
     }
     let counts = film["quality"]["tiles_by_samples"].as_object().unwrap();
     assert_eq!(counts.values().map(|n| n.as_u64().unwrap()).sum::<u64>(), TILES as u64);
