@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
+use super::display::DisplayErrors;
 use super::pace::Pace;
 use super::samples::SampleSettings;
 use super::schedule::Step;
@@ -55,8 +56,12 @@ pub struct Accumulated {
     pub max_spp: u32,
     /// Rendering stopped before all samples were taken.
     pub stopped_early: bool,
-    /// Converged tiles, if [`super::schedule::FilmOptions::target_rmse`] is set.
+    /// Converged tiles, if the film has a target ([`super::schedule::FilmOptions::target_rmse`],
+    /// [`super::schedule::FilmOptions::display_target`]).
     pub converged: Option<TileCount>,
+    /// Errors of displayed tiles, infinite before their second check, if
+    /// [`super::schedule::FilmOptions::display_target`] is set.
+    pub displayed: Option<TileErrors>,
     /// Camera rays traced.
     pub primary_rays: u64,
     /// Camera rays not traced because their tile contains no geometry.
@@ -178,8 +183,9 @@ pub(crate) fn accumulate<E: Estimator>(
         pace: Pace::up_to(launch_rays(&tracer.device().info)),
     };
     let rates = vec![Rate::default(); blocks.len()];
-    let mut run = Run { launcher, camera, samples, params, start, blocks, rates, tile_samples, out };
-    let mut next = options.next(samples.spp, &run.tile_samples, &run.out.film);
+    let displayed = options.display_target.map(|target| DisplayErrors::new(target, &out.film));
+    let mut run = Run { launcher, camera, samples, params, start, blocks, rates, tile_samples, displayed, out };
+    let mut next = options.next(samples.spp, &run.tile_samples, &|| run.open_tiles());
     while let Some(step) = next {
         let most = run.tile_samples.iter().copied().max().unwrap_or(0);
         let stopped = run.step(&step, control)?;
@@ -187,7 +193,10 @@ pub(crate) fn accumulate<E: Estimator>(
             state.set_tile_samples(&run.tile_samples);
             run.out.film = state.film();
         }
-        next = options.next(samples.spp, &run.tile_samples, &run.out.film);
+        if let Some(displayed) = &mut run.displayed {
+            displayed.update(&run.out.film, &run.tile_samples, |n| options.is_check(n));
+        }
+        next = options.next(samples.spp, &run.tile_samples, &|| run.open_tiles());
         run.sum_up();
         if stopped {
             break;
@@ -221,6 +230,8 @@ struct Run<'a, E> {
     rates: Vec<Rate>,
     // samples per pixel of each tile of the image
     tile_samples: Vec<u32>,
+    // errors of displayed tiles, if they decide
+    displayed: Option<DisplayErrors>,
     out: Accumulated,
 }
 
@@ -397,12 +408,21 @@ impl<E: Estimator> Run<'_, E> {
         Ok(())
     }
 
+    /// For each tile, true if it has not converged to the target of the film.
+    fn open_tiles(&self) -> Vec<bool> {
+        match (&self.displayed, self.samples.film.target_rmse) {
+            (Some(displayed), _) => displayed.open(),
+            (None, Some(target)) => TileErrors::from_film(&self.out.film).unconverged(target),
+            (None, None) => vec![true; self.tile_samples.len()],
+        }
+    }
+
     /// Updates the statistics of the image.
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
         self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
-        self.out.converged =
-            self.samples.film.target_rmse.map(|target| TileErrors::from_film(&self.out.film).count(target));
+        self.out.converged = self.samples.film.is_adaptive().then(|| TileCount::from_open(&self.open_tiles()));
+        self.out.displayed = self.displayed.as_ref().map(|d| d.tiles().clone());
     }
 }
 

@@ -28,6 +28,13 @@ pub struct TileCount {
     pub all: usize,
 }
 
+impl TileCount {
+    /// Counts tiles, of which `open` says whether they have not converged.
+    pub(crate) fn from_open(open: &[bool]) -> Self {
+        Self { done: open.iter().filter(|open| !**open).count(), all: open.len() }
+    }
+}
+
 impl TileErrors {
     /// Estimates the errors of a film. Pixels with fewer than two samples have an infinite error.
     pub fn from_film(film: &Film) -> Self {
@@ -44,22 +51,38 @@ impl TileErrors {
         Self { size, errors: sums.into_iter().map(|(sum, n)| (sum / f64::from(n.max(1))).sqrt()).collect() }
     }
 
+    /// Errors that are not known yet of a film of `size` pixels: they are infinite.
+    pub(crate) fn unknown(size: [u32; 2]) -> Self {
+        let size = tiles(size);
+        Self { size, errors: vec![f64::INFINITY; size[0] * size[1]] }
+    }
+
+    /// The error of each tile, rows from the top.
+    pub fn errors(&self) -> &[f64] {
+        &self.errors
+    }
+
+    /// Sets the error of a tile.
+    pub(crate) fn set(&mut self, tile: usize, error: f64) {
+        self.errors[tile] = error;
+    }
+
     /// For each tile, true if its error, or that of one of its eight neighbours, exceeds `target`.
     pub fn unconverged(&self, target: f64) -> Vec<bool> {
+        (0..self.errors.len()).map(|tile| !self.around(tile).all(|error| error <= target)).collect()
+    }
+
+    /// Errors of a tile and of its neighbours, of which there are eight within the image.
+    pub(crate) fn around(&self, tile: usize) -> impl Iterator<Item = f64> {
         let [width, height] = self.size;
-        let enough = |x: usize, y: usize| self.errors[y * width + x] <= target;
         let neighbours = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
-        (0..width * height)
-            .map(|tile| {
-                let (x, y) = (tile % width, tile / width);
-                !neighbours(y, height).all(|y| neighbours(x, width).all(|x| enough(x, y)))
-            })
-            .collect()
+        let (columns, rows) = (neighbours(tile % width, width), neighbours(tile / width, height));
+        rows.flat_map(move |y| columns.clone().map(move |x| self.errors[y * width + x]))
     }
 
     /// Number of tiles that have converged to `target`.
     pub fn count(&self, target: f64) -> TileCount {
-        TileCount { done: self.unconverged(target).iter().filter(|open| !**open).count(), all: self.errors.len() }
+        TileCount::from_open(&self.unconverged(target))
     }
 }
 

@@ -12,6 +12,7 @@ pub mod block;
 pub mod camera;
 mod control;
 pub mod convergence;
+pub mod display;
 pub mod pace;
 mod samples;
 pub mod schedule;

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-use super::Film;
-use super::convergence::{FIRST_CHECK, TileErrors};
+use super::convergence::FIRST_CHECK;
+use super::display::{DisplayTarget, FIRST_DISPLAY_CHECK};
 use super::state::FilmState;
 
 /// Initial state of a film, its intermediate stops, and whether its sums are kept.
@@ -20,6 +20,11 @@ pub struct FilmOptions {
     /// Stop sampling tiles whose standard error is at most this, tested at powers of two of samples
     /// from [`FIRST_CHECK`] on. The samples per pixel are then the maximum.
     pub target_rmse: Option<f64>,
+    /// Stop sampling tiles whose displayed error is at most this, tested at powers of two of
+    /// samples from 2 * [`FIRST_DISPLAY_CHECK`] on. It prevails over `target_rmse`, and the samples
+    /// per pixel are the maximum. A film that is resumed does not know its last check, and takes
+    /// more.
+    pub display_target: Option<DisplayTarget>,
 }
 
 /// The next step of a film.
@@ -36,28 +41,47 @@ pub(crate) struct Step {
 impl FilmOptions {
     /// Must the sums be read back between steps or at the end?
     pub(crate) fn needs_state(&self) -> bool {
-        self.start.is_some() || self.keep_state || !self.intervals.is_empty() || self.target_rmse.is_some()
+        self.start.is_some() || self.keep_state || !self.intervals.is_empty() || self.is_adaptive()
+    }
+
+    /// Are tiles sampled until they have converged?
+    pub(crate) fn is_adaptive(&self) -> bool {
+        self.display_target.is_some() || self.target_rmse.is_some()
+    }
+
+    /// Is a tile with `n` samples tested for convergence?
+    pub(crate) fn is_check(&self, n: u32) -> bool {
+        n >= self.first_check() && n.is_power_of_two()
+    }
+
+    fn first_check(&self) -> u32 {
+        if self.display_target.is_some() { FIRST_DISPLAY_CHECK } else { FIRST_CHECK }
+    }
+
+    /// The first check beyond `n` samples.
+    fn next_check(&self, n: u32) -> u32 {
+        n.checked_add(1).and_then(u32::checked_next_power_of_two).map_or(u32::MAX, |n| n.max(self.first_check()))
     }
 
     /// The next step to `spp` samples of a film of tiles with `tile_samples`; `None` at the end.
-    pub(crate) fn next(&self, spp: u32, tile_samples: &[u32], film: &Film) -> Option<Step> {
+    /// `open` finds the tiles that have not converged, and is called at checks alone.
+    pub(crate) fn next(&self, spp: u32, tile_samples: &[u32], open: &dyn Fn() -> Vec<bool>) -> Option<Step> {
         let below = |n: u32| n < spp;
         let mut tiles: Vec<bool> = tile_samples.iter().map(|&n| below(n)).collect();
-        if let Some(target) = self.target_rmse {
+        if self.is_adaptive() {
             // a film saved between two checks first brings its tiles to the next check (or stops at
             // `spp`), so that where it was saved does not change which tiles are tested
-            if tile_samples.iter().any(|&n| !is_check(n)) {
-                tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= !is_check(n));
+            if tile_samples.iter().any(|&n| !self.is_check(n)) {
+                tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= !self.is_check(n));
             } else if tiles.contains(&true) {
-                let open = TileErrors::from_film(film).unconverged(target);
-                tiles.iter_mut().zip(open).for_each(|(tile, open)| *tile &= open);
+                tiles.iter_mut().zip(open()).for_each(|(tile, open)| *tile &= open);
             }
         }
         let chosen = || tile_samples.iter().zip(&tiles).filter(|(_, chosen)| **chosen).map(|(n, _)| *n);
         let least = chosen().min()?;
         let left = chosen().map(|n| u64::from(spp - n)).sum();
         let interval = self.intervals.iter().copied().find(|&n| n > least).unwrap_or(spp);
-        let check = if self.target_rmse.is_some() { next_check(least) } else { spp };
+        let check = if self.is_adaptive() { self.next_check(least) } else { spp };
         let goal = spp.min(interval).min(check);
         // tiles with more samples wait
         tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= n < goal);
@@ -65,19 +89,11 @@ impl FilmOptions {
     }
 }
 
-/// Is a tile with `n` samples tested for convergence?
-fn is_check(n: u32) -> bool {
-    n >= FIRST_CHECK && n.is_power_of_two()
-}
-
-/// The first check beyond `n` samples.
-fn next_check(n: u32) -> u32 {
-    n.checked_add(1).and_then(u32::checked_next_power_of_two).map_or(u32::MAX, |n| n.max(FIRST_CHECK))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Film;
+    use crate::film::convergence::TileErrors;
 
     /// The goals of a film whose tiles all stay open, from `first` samples on.
     fn goals(options: &FilmOptions, first: u32, spp: u32) -> Vec<u32> {
@@ -85,7 +101,7 @@ mod tests {
         film.variance.fill(1e9);
         let (mut samples, mut goals) = ([first; 2], Vec::new());
         film.samples.fill(first);
-        while let Some(step) = options.next(spp, &samples, &film) {
+        while let Some(step) = options.next(spp, &samples, &|| TileErrors::from_film(&film).unconverged(0.1)) {
             assert_eq!((step.tiles, step.left), (vec![true; 2], 2 * u64::from(spp - samples[0])));
             goals.push(step.goal);
             samples = [step.goal; 2];
@@ -108,9 +124,13 @@ mod tests {
         assert_eq!(goals(&target, 0, 300), [64, 128, 256, 300]);
         assert_eq!(goals(&target, 100, 512), [128, 256, 512]);
         assert_eq!(goals(&target, 0, 10), [10]);
+        let displayed = DisplayTarget { error: 0.01, ..Default::default() };
+        let displayed = FilmOptions { display_target: Some(displayed), ..Default::default() };
+        assert!(displayed.needs_state());
+        assert_eq!(goals(&displayed, 0, 100), [8, 16, 32, 64, 100]);
         let both = FilmOptions { intervals: vec![16, 100], ..target };
         assert_eq!(goals(&both, 0, 128), [16, 64, 100, 128]);
-        assert_eq!(next_check(u32::MAX), u32::MAX);
+        assert_eq!(FilmOptions::default().next_check(u32::MAX), u32::MAX);
     }
 
     #[test]
@@ -123,7 +143,7 @@ mod tests {
                 film.samples[x] = samples[x % 32 / 8];
                 film.variance[x] = variance[x % 32 / 8];
             }
-            options.next(1024, &samples, &film)
+            options.next(1024, &samples, &|| TileErrors::from_film(&film).unconverged(0.1))
         };
         // errors 0.05, 0.05, 0.05, 1
         let step = set([64; 4], [0.16, 0.16, 0.16, 64.0]).unwrap();
@@ -133,11 +153,8 @@ mod tests {
         assert_eq!((step.goal, step.tiles), (128, vec![false, false, true, true]));
         // at the end of a run of 100 samples, too
         assert_eq!(
-            FilmOptions { target_rmse: Some(0.1), ..Default::default() }.next(
-                100,
-                &[64, 64, 100, 100],
-                &Film::new(32, 8, 1)
-            ),
+            FilmOptions { target_rmse: Some(0.1), ..Default::default() }
+                .next(100, &[64, 64, 100, 100], &|| TileErrors::from_film(&Film::new(32, 8, 1)).unconverged(0.1)),
             None
         );
         // the third has turned out to be noisy: the second, which has fewer samples, goes on first

@@ -1,5 +1,6 @@
 //! Whether an image shows anything: its mean over surfaces, and a remedy if all is black or white.
 
+use crate::film::Film;
 use crate::film::accumulate::Accumulated;
 use crate::settings::Capability;
 
@@ -33,8 +34,7 @@ pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
 /// which the brightest twentieth becomes white if that is less; `None` where that is near to what is
 /// shown anyway, and where no surface has light. Reinhard,
 /// Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
-pub fn exposure(image: &Accumulated) -> Option<f64> {
-    let film = &image.film;
+pub fn exposure(film: &Film) -> Option<f64> {
     let planes = [0, 1, 2].map(|c| film.plane(c));
     let shown = film.coverage.iter().enumerate().filter(|(_, a)| **a >= COVERED);
     let luminance = |(i, _)| -> f64 { LUMINANCE.iter().zip(&planes).map(|(w, p)| w * f64::from(p[i])).sum() };
@@ -114,7 +114,7 @@ mod tests {
                 film.mean[3 * i..][..3].fill(*value);
                 film.coverage[i] = *coverage;
             }
-            exposure(&Accumulated { film, ..Default::default() })
+            exposure(&film)
         };
         assert_eq!(image(&[(0.18, 1.0), (0.36, 1.0)]), None);
         // the average of logarithms, of surfaces alone

@@ -24,7 +24,7 @@ pub const FILE_NAME: &str = "skylit.toml";
 /// Settings that a file beside a scene may have: how the scene is seen, lit and sampled. An entry
 /// that ends with a dot is a table with all that is in it. Such a file comes from strangers: it
 /// does not choose what is written, what is loaded besides images and camera paths, or a device.
-const SCENE_SETTINGS: [&str; 12] = [
+const SCENE_SETTINGS: [&str; 13] = [
     "integrator",
     "scene.",
     "image.spp",
@@ -36,6 +36,7 @@ const SCENE_SETTINGS: [&str; 12] = [
     "lighting.",
     "picture.",
     "film.target_rmse",
+    "film.quality",
     "frames.",
 ];
 
@@ -397,6 +398,20 @@ mod tests {
     }
 
     #[test]
+    fn samples_per_pixel_and_a_quality_replace_each_other() {
+        let spp = file("/u/skylit.toml", "[image]\nspp = 8");
+        let quality = file("/s/skylit.toml", "[film]\nquality = \"good\"");
+        let both = [spp.clone(), quality.clone()];
+        assert_eq!(resolved(&both, "").settings, words("--quality good"));
+        assert_eq!(resolved(&[quality.clone(), spp], "").settings, words("--spp 8"));
+        assert_eq!(resolved(&both, "--spp 4").settings, words("--spp 4"));
+        // a default makes no stills of frames in real time
+        let r = resolved(&both, "--orbit");
+        assert_eq!((r.settings.film.quality, r.settings.image.spp), (None, None));
+        assert!(r.settings.realtime_setting().is_some());
+    }
+
+    #[test]
     fn options_of_the_compute_tracer_do_not_choose_it() {
         let files = [file("/u/skylit.toml", "[device]\nbvh_cache = \"bvh\"\nvalidation = true")];
         let none = RenderSettings::default();
@@ -413,7 +428,7 @@ mod tests {
     #[test]
     fn a_scene_chooses_how_it_looks_and_no_more() {
         let allowed = "integrator = \"path\"\n[image]\nspp = 4\nsize = [8, 8]\nseed = 1\npixel_filter = \"box\"\n[camera]\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n\
-            [integrators.ao]\nao_radius = 1\n[lighting]\nenvironment = \"sky.hdr\"\n[picture]\nexposure = 1\n[film]\ntarget_rmse = 0.1\n[frames]\nhistory = 4";
+            [integrators.ao]\nao_radius = 1\n[lighting]\nenvironment = \"sky.hdr\"\n[picture]\nexposure = 1\n[film]\ntarget_rmse = 0.1\nquality = \"good\"\n[frames]\nhistory = 4";
         assert!(file("/s/skylit.toml", allowed).check_scene_settings().is_ok());
         for (text, key) in [
             ("[device]\nbvh_cache = \".\"", "device.bvh_cache"),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value, json};
 
 use super::denoising::DenoiseReport;
+use super::quality::QualityReport;
 use super::settings::FilmSettings;
 use super::still::{camera_text, spp_text};
 use super::survey::significant;
@@ -172,6 +173,7 @@ impl Setup {
 #[derive(Clone, Debug)]
 pub struct FilmReport {
     lines: Vec<String>,
+    explanations: Vec<String>,
     record: Value,
 }
 
@@ -199,6 +201,8 @@ impl FilmReport {
                 tiles.all
             ));
         }
+        let quality = options.quality.and_then(|quality| QualityReport::new(quality, image));
+        lines.extend(quality.iter().flat_map(QualityReport::lines));
         if !options.intervals && hints.save_intervals.iter().any(|&n| n < spp) {
             lines.push("the scene requests intermediate images: add --intervals".into());
         }
@@ -206,11 +210,13 @@ impl FilmReport {
             "samples": { "min": min, "mean": mean, "max": max },
             "estimated_rmse": estimated,
             "target_rmse": options.target_rmse,
+            "quality": quality.as_ref().map(QualityReport::record),
             "tiles": image.converged,
             "resumed": options.resume.as_ref().map(|path| path.to_string_lossy()),
             "samples_before": before,
         });
-        Self { lines, record }
+        let explanations = quality.map(|q| q.explanations()).unwrap_or_default();
+        Self { lines, explanations, record }
     }
 }
 
@@ -317,6 +323,7 @@ impl StillReport {
             self.skipped_primary_rays,
             100.0 * self.skipped_primary_rays as f64 / all.max(1) as f64
         ));
+        lines.extend(self.film.explanations.iter().cloned());
         lines.extend(self.denoise.iter().map(|d| d.explanation.clone()));
         let steps: Vec<_> = self.device_seconds.iter().map(|(step, s)| format!("{step} {s:.3}")).collect();
         lines.push(format!("device seconds: {}", steps.join(", ")));

@@ -4,6 +4,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::quality::Quality;
 pub use super::shell::quoted;
 use super::survey::Survey;
 use super::survey::framing::{self, ChosenCamera, ViewName};
@@ -220,6 +221,11 @@ settings! {
         /// Adaptive sampling: stop sampling an 8x8 tile once its estimated standard error and its neighbours' are at most E (radiance), tested at powers of two
         /// from 64 samples on. --spp is then the maximum
         target_rmse: Option<f64>, option(value_name = "E", value_parser = parse_target, allow_hyphen_values = true), applies(AppliesTo::STILLS);
+        /// As many samples as a display needs: draft, good or final
+        ///
+        /// Tiles of 8x8 pixels are sampled until the noise that a display shows of them is at most 4/255 (draft), 2/255 (good) or 1/255 (final) of sRGB values,
+        /// with at most 256, 1024 or 4096 samples per pixel; --spp is left out. The error that was reached is printed.
+        quality: Option<Quality>, option(value_name = "NAME", value_enum, hide_possible_values = true, help_heading = "Image"), applies(DENOISED), basic;
     }
 }
 
@@ -228,7 +234,29 @@ impl FilmSettings {
     pub fn keeps_state(&self) -> bool {
         self.resumable || self.intervals || self.resume.is_some()
     }
+
+    /// Checks that nothing else decides how many samples a quality takes.
+    fn check(&self, spp: Option<u32>) -> Result<()> {
+        if self.quality.is_none() {
+            return Ok(());
+        }
+        let others = [
+            (spp.is_some(), "--spp", "both say how many samples there are: leave one of them out"),
+            (self.target_rmse.is_some(), "--target-rmse", "are two bounds of the error: leave one of them out"),
+            (self.resume.is_some(), "--resume", RESUMED),
+            (self.resumable, "--resumable", RESUMED),
+            (self.intervals, "--intervals", RESUMED),
+        ];
+        match others.iter().find(|(is_given, ..)| *is_given) {
+            Some((_, option, why)) => Err(Error::Usage(format!("--quality and {option} {why}"))),
+            None => Ok(()),
+        }
+    }
 }
+
+/// Why films of a quality are not resumed.
+const RESUMED: &str = "do not go together, for a film that is saved does not keep the halves of its samples: \
+    leave one of them out, or use --target-rmse";
 
 /// Aspect ratios from which image sizes follow: others are mistakes.
 const ASPECTS: std::ops::RangeInclusive<f64> = 1.0 / 64.0..=64.0;
@@ -396,12 +424,18 @@ impl RenderSettings {
         out
     }
 
-    /// These settings without those that `other` gives; cameras, motion and environments go whole.
+    /// These settings without those that `other` gives; cameras, motion, environments and what
+    /// decides the number of samples go whole.
     pub(super) fn without_replaced(&self, other: &Self) -> Self {
         let mut out = self.clone();
         let (camera, motion) = (&other.camera, &other.frames);
         if camera.chooses() {
             out.camera = CameraSettings { fov_y: out.camera.fov_y, ..Default::default() };
+        }
+        match (other.image.spp, other.film.quality) {
+            (Some(_), _) => out.film.quality = None,
+            (_, Some(_)) => (out.image.spp, out.film.target_rmse) = (None, None),
+            (None, None) => {}
         }
         if camera.chooses() || camera.fov_y.is_some() {
             out.frames.camera_path = None;
@@ -458,10 +492,13 @@ impl RenderSettings {
         if self.is_still_sequence() { None } else { self.frames.given().into_iter().next() }
     }
 
-    /// Returns true for stills, one per frame: `spp`, and nothing that only real-time frames have.
+    /// Returns true for stills, one per frame: `spp` or a quality, and nothing that only real-time
+    /// frames have.
     pub fn is_still_sequence(&self) -> bool {
         let given = self.frames.given();
-        self.image.spp.is_some() && !given.is_empty() && given.iter().all(|s| s.applies.stills)
+        (self.image.spp.is_some() || self.film.quality.is_some())
+            && !given.is_empty()
+            && given.iter().all(|s| s.applies.stills)
     }
 
     /// Checks conditions on more than one setting: none may be given that would have no effect.
@@ -480,6 +517,7 @@ impl RenderSettings {
                 setting.option()
             )));
         }
+        self.film.check(self.image.spp)?;
         if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
             return Err(Error::Usage("--aov bent is for frames in real time: add --preset".into()));
         }
@@ -544,8 +582,11 @@ impl RenderSettings {
         self.image.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE)
     }
 
-    /// Samples per pixel, of a scene.
+    /// Samples per pixel, of a scene; the maximum, if sampling adapts.
     pub fn spp(&self, scene: &Scene) -> u32 {
+        if let Some(quality) = self.film.quality {
+            return quality.max_spp();
+        }
         self.image.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1)
     }
 

@@ -19,6 +19,7 @@ use crate::files;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
+use crate::film::display::DisplayTarget;
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::lighting::LightingSettings;
@@ -278,13 +279,27 @@ impl<'a> StillRender<'a> {
             control.warning(&warning);
             self.warnings.push(warning);
         }
+        let display_target = self.display_target();
+        let job = &mut self.job;
         job.samples.film = FilmOptions {
             start: resumed.map(|r| r.state.into()),
             keep_state: settings.film.keeps_state(),
             intervals: stops(settings, self.extras, &job.scene.hints, job.samples.spp),
             target_rmse: settings.film.target_rmse,
+            display_target,
         };
         Ok(())
+    }
+
+    /// The error that displayed tiles may have, if a quality was chosen.
+    fn display_target(&self) -> Option<DisplayTarget> {
+        let PictureOptions { tone_map, exposure } = self.completed.settings.picture.options();
+        self.completed.settings.film.quality.map(|quality| DisplayTarget {
+            error: quality.error(),
+            tone_map,
+            exposure: exposure.into(),
+            exposure_of_film: self.chooses_exposure().then_some(brightness::exposure),
+        })
     }
 
     /// Builds the tracer, unless the one at hand has the same scene data.
@@ -350,12 +365,17 @@ impl<'a> StillRender<'a> {
     /// The exposure that is chosen for the scene's own light, in stops; `None` for that of the
     /// settings.
     fn chosen_exposure(&self, image: &Accumulated) -> Option<f64> {
+        self.chooses_exposure().then(|| brightness::exposure(&image.film)).flatten()
+    }
+
+    /// Returns true if the exposure is open, and the image shows the scene's own light.
+    fn chooses_exposure(&self) -> bool {
         let settings = &self.completed.settings;
         let shows_own_light = self.integrator.capabilities().contains(&Capability::SceneLights)
             && settings.lighting == LightingSettings::default()
             && !self.renderer.lighting.is_automatic;
         let is_open = settings.picture.exposure.is_none() && !self.extras.fixed_exposure;
-        if shows_own_light && is_open { brightness::exposure(image) } else { None }
+        shows_own_light && is_open
     }
 
     /// Writes the report, and hands the warnings about the image to `control`.
@@ -523,6 +543,9 @@ impl Composer<'_> {
         out.extend(self.render.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
         if let Some(target) = completed.settings.film.target_rmse {
             out.push(("target_rmse", target.to_string()));
+        }
+        if let Some(quality) = completed.settings.film.quality {
+            out.push(("quality", quality.to_string()));
         }
         out.extend(self.render.chosen.clone().map(|options| (CHOSEN, options)));
         out.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()

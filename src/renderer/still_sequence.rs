@@ -48,7 +48,9 @@ impl Renderer {
     pub fn still_sequence(&mut self, settings: &RenderSettings) -> Result<StillSequence<'_>> {
         settings.check()?;
         if !settings.is_still_sequence() {
-            return Err(Error::Usage("stills of a time line need --spp, and no setting of frames in real time".into()));
+            return Err(Error::Usage(
+                "stills of a time line need --spp or --quality, and no setting of frames in real time".into(),
+            ));
         }
         if settings.film.resume.is_some() || settings.film.keeps_state() {
             return Err(Error::Usage(
@@ -121,10 +123,11 @@ impl StillSequence<'_> {
             None => !image.metadata.iter().any(|(k, _)| k == key) || key.ends_with(".hash"),
         });
         let scene = crate::files::portable_name(&self.renderer.name);
-        Ok(same
-            && has("spp", &job.samples.spp.to_string())
-            && has("scene", &scene)
-            && [image.width, image.height] == self.size())
+        let has_samples = match settings.film.quality {
+            Some(quality) => has("quality", quality.name()),
+            None => has("spp", &job.samples.spp.to_string()),
+        };
+        Ok(same && has_samples && has("scene", &scene) && [image.width, image.height] == self.size())
     }
 
     /// Renders the still of a frame. Animations loop.

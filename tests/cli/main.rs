@@ -26,6 +26,7 @@ mod manners;
 mod measured;
 mod outputs;
 mod program;
+mod quality;
 #[cfg(unix)]
 mod replaced;
 mod sequences;

@@ -73,6 +73,23 @@ fn usage_errors() {
     );
     refuses(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
     refuses(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
+    refuses(&render(&["--quality", "best"]), 64, "draft, good, final");
+    refuses(&render(&["--quality", "good", "--spp", "4"]), 64, "--quality and --spp both say how many samples");
+    refuses(&render(&["--quality", "good", "--target-rmse", "1"]), 64, "--quality and --target-rmse are two bounds");
+    for option in [&["--resumable"][..], &["--intervals"], &["--resume", "a.exr"]] {
+        let says = format!("--quality and {} do not go together", option[0]);
+        refuses(&render(&[&["--quality", "good"], option].concat()), 64, &says);
+    }
+    refuses(
+        &render(&["--quality", "good", "--preset", "fast"]),
+        64,
+        "--quality is for stills, and --preset selects frames",
+    );
+    refuses(
+        &render(&["--quality", "good", "--integrator", "depth"]),
+        64,
+        "--quality has no effect on --integrator depth",
+    );
     refuses(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");
     refuses(
         &["render", "builtin:plane", "-o", "a.png", "--integrator", "path", "--resumable"],

@@ -99,12 +99,15 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     // totals of all stills
     let seconds = start.elapsed().as_secs_f64();
     let skipped = if finished > 0 { format!(", {finished} finished before") } else { String::new() };
+    let samples = match args.settings.film.quality {
+        Some(quality) => format!("quality {quality}"),
+        None => format!("{} spp", args.settings.image.spp.unwrap_or(0)),
+    };
     console.line(&format!(
-        "{}: {} stills{skipped}, {}, {} spp, in {seconds:.1} s",
+        "{}: {} stills{skipped}, {}, {samples}, in {seconds:.1} s",
         names(args),
         records.len(),
         args.settings.integrator().name(),
-        args.settings.image.spp.unwrap_or(0)
     ))?;
     choices.iter().try_for_each(|choice| console.line(choice))?;
 
