@@ -355,7 +355,7 @@ impl<'a> StillRender<'a> {
             && settings.lighting == LightingSettings::default()
             && !self.renderer.lighting.is_automatic;
         let is_open = settings.picture.exposure.is_none() && !self.extras.fixed_exposure;
-        if shows_own_light && is_open { brightness::exposure(image) } else { None }
+        if shows_own_light && is_open { brightness::exposure(&image.film.mean, &image.film.coverage) } else { None }
     }
 
     /// Writes the report, and hands the warnings about the image to `control`.

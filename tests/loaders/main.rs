@@ -17,4 +17,5 @@ mod memory;
 mod obj;
 mod own;
 mod shared;
+mod sky;
 mod squares;
