@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use glam::{DMat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use crate::error::{Error, Result};
 #[cfg(feature = "cli")]
 use crate::scene::light_spec;
 use crate::scene::light_spec::LightSpec;
-use crate::scene::{Environment, Scene, load};
+use crate::scene::sky::Sky;
+use crate::scene::{Environment, Light, Scene, load};
 use crate::settings::parse::parse_vector;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_factor, parse_number};
@@ -22,11 +23,15 @@ settings! {
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
         /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant
-        /// radiance R,G,B, or `none` [default: the scene's]
+        /// radiance R,G,B, a clear `sky` with its sun, or `none` [default: the scene's]
+        ///
+        /// `sky:ELEVATION,AZIMUTH,TURBIDITY` says where the sun is, -6 to 90 degrees above the
+        /// horizon and in degrees clockwise from -z, and how hazy the air is, 1 to 10; numbers may
+        /// be left out from the end [40,215,3]. A radiance of 1 is 20,000 candela per square metre.
         ///
         /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in
         /// a closed room, and the render prints them as options; `none` leaves it dark.
-        environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
+        environment: Option<String>, option(value_name = "FILE|R,G,B|sky|none", value_parser = parse_environment), applies(LIT), basic;
         /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from
         /// above
         environment_turn: Option<f64>,
@@ -41,14 +46,41 @@ settings! {
     }
 }
 
+/// The text of an environment; what it says of a sky is checked.
+#[cfg(feature = "cli")]
+fn parse_environment(text: &str) -> Result<String, String> {
+    Sky::parse(text).transpose().map(|_| text.to_owned())
+}
+
+/// An environment as it is asked for.
+enum Wanted {
+    None,
+    Radiance(DVec3),
+    Sky(Result<Sky, String>),
+    File(PathBuf),
+}
+
+impl Wanted {
+    fn parse(text: &str) -> Self {
+        match (text, parse_vector(text), Sky::parse(text)) {
+            ("none", ..) => Self::None,
+            (_, Ok(radiance), _) => Self::Radiance(radiance),
+            (_, _, Some(sky)) => Self::Sky(sky),
+            _ => Self::File(PathBuf::from(text)),
+        }
+    }
+}
+
 impl LightingSettings {
     /// Adds the lights to a scene, and replaces its environment if one is given.
     ///
     /// # Errors
-    /// [`Error::Input`] for a map that cannot be read, [`Error::Usage`] for a negative radiance.
+    /// [`Error::Input`] for a map that cannot be read, [`Error::Usage`] for a negative radiance and
+    /// for a sky that there is not.
     pub fn apply(&self, scene: &mut Scene) -> Result<()> {
-        if let Some(environment) = self.environment(&mut |warning| scene.report.warnings.push(warning))? {
+        if let Some((environment, sun)) = self.environment(&mut |warning| scene.report.warnings.push(warning))? {
             scene.environment = environment;
+            scene.lights.extend(sun);
         }
         self.light.iter().for_each(|l| l.add(scene));
         Ok(())
@@ -56,24 +88,36 @@ impl LightingSettings {
 
     /// The file or folder of the environment, if it is one.
     pub fn environment_file(&self) -> Option<PathBuf> {
-        self.environment.as_ref().filter(|text| *text != "none" && parse_vector(text).is_err()).map(PathBuf::from)
+        match Wanted::parse(self.environment.as_ref()?) {
+            Wanted::File(path) => Some(path),
+            _ => None,
+        }
     }
 
-    fn environment(&self, warn: &mut dyn FnMut(String)) -> Result<Option<Environment>> {
+    /// The environment, and the sun that belongs to it.
+    fn environment(&self, warn: &mut dyn FnMut(String)) -> Result<Option<(Environment, Option<Light>)>> {
         let Some(text) = &self.environment else { return Ok(None) };
-        if text == "none" {
-            return Ok(Some(Environment::Black));
-        }
-        let scale = self.environment_scale.unwrap_or(1.0) as f32;
-        if let Ok(colour) = parse_vector(text) {
-            if colour.min_element() < 0.0 {
+        let scale = self.environment_scale.unwrap_or(1.0);
+        let turn = self.environment_turn.unwrap_or(0.0);
+        let environment = match Wanted::parse(text) {
+            Wanted::None => Environment::Black,
+            Wanted::Radiance(colour) if colour.min_element() < 0.0 => {
                 return Err(Error::Usage(format!("--environment {text}: radiance must not be negative")));
             }
-            return Ok(Some(Environment::Uniform(colour.as_vec3() * scale)));
-        }
-        let mut map = load::load_environment_with(&PathBuf::from(text), warn)?;
-        map.factor = Vec3::splat(scale);
-        map.to_map = DMat3::from_rotation_y(-self.environment_turn.unwrap_or(0.0).to_radians());
-        Ok(Some(Environment::Map(map)))
+            Wanted::Radiance(colour) => Environment::Uniform(colour.as_vec3() * scale as f32),
+            Wanted::Sky(sky) => {
+                let sky = sky.map_err(|e| Error::Usage(format!("--environment {text}: {e}")))?;
+                // counter-clockwise, as maps are turned
+                let (map, sun) = Sky { azimuth: sky.azimuth - turn, ..sky }.light(scale);
+                return Ok(Some((Environment::Map(map), sun)));
+            }
+            Wanted::File(path) => {
+                let mut map = load::load_environment_with(&path, warn)?;
+                map.factor = Vec3::splat(scale as f32);
+                map.to_map = DMat3::from_rotation_y(-turn.to_radians());
+                Environment::Map(map)
+            }
+        };
+        Ok(Some((environment, None)))
     }
 }

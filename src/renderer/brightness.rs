@@ -30,14 +30,20 @@ pub fn surface_mean(image: &Accumulated, channels: usize) -> Option<f64> {
     (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
 }
 
+/// [`exposure`] of a film of three channels.
+pub fn film_exposure(film: &Film) -> Option<f64> {
+    exposure(&film.mean, &film.coverage)
+}
+
 /// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms, or at
 /// which the brightest twentieth becomes white if that is less; `None` where that is near to what is
 /// shown anyway, and where no surface has light. Reinhard,
 /// Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
-pub fn exposure(film: &Film) -> Option<f64> {
-    let planes = [0, 1, 2].map(|c| film.plane(c));
-    let shown = film.coverage.iter().enumerate().filter(|(_, a)| **a >= COVERED);
-    let luminance = |(i, _)| -> f64 { LUMINANCE.iter().zip(&planes).map(|(w, p)| w * f64::from(p[i])).sum() };
+///
+/// `rgb` has three values a pixel, linear; `coverage` is the share of a pixel that surfaces cover.
+pub fn exposure(rgb: &[f32], coverage: &[f32]) -> Option<f64> {
+    let shown = rgb.chunks_exact(3).zip(coverage).filter(|(_, a)| **a >= COVERED);
+    let luminance = |(rgb, _): (&[f32], _)| -> f64 { LUMINANCE.iter().zip(rgb).map(|(w, v)| w * f64::from(*v)).sum() };
     let mut values: Vec<f64> = shown.map(luminance).collect();
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     if mean <= 0.0 || !mean.is_finite() {
@@ -109,12 +115,9 @@ mod tests {
     #[test]
     fn exposures_follow_surfaces() {
         let image = |values: &[(f32, f32)]| {
-            let mut film = crate::film::Film::new(values.len() as u32, 1, 3);
-            for (i, (value, coverage)) in values.iter().enumerate() {
-                film.mean[3 * i..][..3].fill(*value);
-                film.coverage[i] = *coverage;
-            }
-            exposure(&film)
+            let rgb: Vec<f32> = values.iter().flat_map(|(value, _)| [*value; 3]).collect();
+            let coverage: Vec<f32> = values.iter().map(|(_, coverage)| *coverage).collect();
+            exposure(&rgb, &coverage)
         };
         assert_eq!(image(&[(0.18, 1.0), (0.36, 1.0)]), None);
         // the average of logarithms, of surfaces alone

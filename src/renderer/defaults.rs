@@ -15,7 +15,7 @@ use super::settings::CameraSettings;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::scene::load::{Confine, confine};
-use crate::settings::parse::{parse_vector, usage_message};
+use crate::settings::parse::usage_message;
 use crate::tracer::DeviceSettings;
 
 /// Name of the files.
@@ -177,8 +177,8 @@ impl DefaultsFile {
         for path in [&mut s.frames.camera_path, &mut s.film.resume, &mut self.device.bvh_cache].into_iter().flatten() {
             *path = folder.join(&*path);
         }
-        if let Some(environment) = s.lighting.environment.as_mut().filter(|e| parse_vector(e).is_err()) {
-            *environment = folder.join(&*environment).to_string_lossy().into_owned();
+        if let Some(path) = s.lighting.environment_file() {
+            s.lighting.environment = Some(folder.join(path).to_string_lossy().into_owned());
         }
     }
 }

@@ -21,7 +21,7 @@
 //! ```
 
 mod ambient;
-mod brightness;
+pub(crate) mod brightness;
 pub mod camera_numbers;
 mod complete;
 #[cfg(feature = "cli")]

@@ -298,7 +298,7 @@ impl<'a> StillRender<'a> {
             error: quality.error(),
             tone_map,
             exposure: exposure.into(),
-            exposure_of_film: self.chooses_exposure().then_some(brightness::exposure),
+            exposure_of_film: self.chooses_exposure().then_some(brightness::film_exposure),
         })
     }
 
@@ -365,7 +365,7 @@ impl<'a> StillRender<'a> {
     /// The exposure that is chosen for the scene's own light, in stops; `None` for that of the
     /// settings.
     fn chosen_exposure(&self, image: &Accumulated) -> Option<f64> {
-        self.chooses_exposure().then(|| brightness::exposure(&image.film)).flatten()
+        self.chooses_exposure().then(|| brightness::film_exposure(&image.film)).flatten()
     }
 
     /// Returns true if the exposure is open, and the image shows the scene's own light.

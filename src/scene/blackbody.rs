@@ -6,14 +6,20 @@ use glam::{DMat3, DVec3, Vec3};
 /// cannot show are cut off at 0: below about 1900 K blue is.
 pub fn blackbody(kelvin: f64) -> Vec3 {
     let xyz = blackbody_xyz(kelvin);
-    // IEC 61966-2-1
-    let to_srgb = DMat3::from_cols(
-        DVec3::new(3.240_969_9, -0.969_243_6, 0.055_630_1),
-        DVec3::new(-1.537_383_2, 1.875_967_5, -0.203_977),
-        DVec3::new(-0.498_610_8, 0.041_555_1, 1.056_971_5),
-    );
-    let rgb = (to_srgb * (xyz / xyz.y)).max(DVec3::ZERO);
+    let rgb = (TO_SRGB * (xyz / xyz.y)).max(DVec3::ZERO);
     (rgb / rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))).as_vec3()
+}
+
+/// From CIE XYZ to linear sRGB (IEC 61966-2-1).
+pub(super) const TO_SRGB: DMat3 = DMat3::from_cols(
+    DVec3::new(3.240_969_9, -0.969_243_6, 0.055_630_1),
+    DVec3::new(-1.537_383_2, 1.875_967_5, -0.203_977),
+    DVec3::new(-0.498_610_8, 0.041_555_1, 1.056_971_5),
+);
+
+/// Colour matching functions x, y and z at 380 + 5 `step` nanometres, up to a step of 80.
+pub(super) fn observer(step: usize) -> DVec3 {
+    DVec3::from_array(MATCHING[step])
 }
 
 /// CIE XYZ of a black body, of no particular scale.
@@ -22,7 +28,7 @@ fn blackbody_xyz(kelvin: f64) -> DVec3 {
 }
 
 /// Spectral radiance at a wavelength in nanometres, of no particular scale.
-fn planck(nanometres: f64, kelvin: f64) -> f64 {
+pub(super) fn planck(nanometres: f64, kelvin: f64) -> f64 {
     /// h c / k in nanometre kelvin (CODATA 2018).
     const C2: f64 = 1.438_776_877e7;
     (nanometres / 560.0).powi(-5) / (C2 / (nanometres * kelvin)).exp_m1()

@@ -22,6 +22,7 @@ pub mod mesh;
 pub mod motion;
 pub mod orbit;
 pub mod settings;
+pub mod sky;
 pub mod texture;
 
 pub use animation::AnimationRig;

@@ -294,12 +294,9 @@ impl Manifest {
     /// The settings of a frame, with files that it names found from the folder.
     pub fn settings(&self, frame: &Frame) -> RenderSettings {
         let mut settings = frame.settings.clone();
-        if let Some(environment) = &mut settings.lighting.environment {
-            let path = self.folder.join(&*environment);
-            // a colour is no file
-            if path.exists() {
-                *environment = path.to_string_lossy().into_owned();
-            }
+        let environment = settings.lighting.environment_file().map(|path| self.folder.join(path));
+        if let Some(path) = environment.filter(|path| path.exists()) {
+            settings.lighting.environment = Some(path.to_string_lossy().into_owned());
         }
         if let Some(path) = &mut settings.frames.camera_path {
             *path = self.folder.join(&*path);

@@ -198,6 +198,9 @@ pub struct App {
     given: RenderSettings,
     /// The animation to start with, by index or name, and its time.
     first_animation: Option<(String, f64)>,
+    /// Whether the exposure of the scene was decided, and the one that was chosen: once a scene, so
+    /// that what is shown does not become brighter and darker by itself.
+    exposure: (bool, Option<f64>),
     /// Which scene of a glTF file is shown; none: the one that the file names.
     pub gltf_scene: Option<String>,
     /// Text to be put on the clipboard.
@@ -263,6 +266,7 @@ impl App {
             frames: VecDeque::new(),
             given: RenderSettings::default(),
             first_animation: None,
+            exposure: (false, None),
             gltf_scene: options.gltf_scene.clone(),
             copied: None,
             closes: false,
@@ -540,6 +544,8 @@ impl App {
                     }
                 }
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
+                Event::Exposure(load, stops) if load == self.loaded => self.expose(stops),
+                Event::Exposure(..) => {}
 
                 // messages
                 Event::Saved(Ok(path)) => self.report(format!("saved {}", path.display()), false),
@@ -580,9 +586,13 @@ impl App {
             let (ao, given) = (&mut self.settings.integrators.ao, &self.given.integrators.ao);
             (ao.ao_radius, ao.ao_falloff) = (given.ao_radius, given.ao_falloff);
             self.lighting.light.clone_from(&self.given.lighting.light);
+            if self.exposure.1.is_some() && self.settings.picture.exposure == self.exposure.1 {
+                self.settings.picture.exposure = self.given.picture.exposure;
+            }
         }
         if !is_same {
             (self.control, self.followed, self.pick, self.comparison) = (None, None, None, None);
+            self.exposure = (false, None);
             self.playback = Playback { animation: None, runs: false, time: 0.0, ..self.playback };
             self.panes = Default::default();
             self.bookmarks.clear();
@@ -607,6 +617,18 @@ impl App {
             *chosen = None;
         }
         self.scene = Some(summary);
+    }
+
+    /// Shows the scene at the exposure that its own light needs, unless there is one already.
+    fn expose(&mut self, stops: Option<f64>) {
+        let is_open = !self.exposure.0 && self.settings.picture.exposure.is_none();
+        self.exposure.0 = true;
+        if let (true, Some(stops)) = (is_open, stops) {
+            self.exposure.1 = Some(stops);
+            self.settings.picture.exposure = Some(stops);
+            let why = "for the light of the scene is far from a display's";
+            self.report(format!("exposure {stops:+} stops, {why}; Picture has others"), false);
+        }
     }
 
     fn picked(&mut self, purpose: PickPurpose, pick: Option<Pick>) {

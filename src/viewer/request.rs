@@ -133,6 +133,9 @@ pub enum Event {
     LightingRefused(Box<[LightingSettings; 2]>, String),
     /// Why an image that is black is black; `None` once it is not.
     Black(Pane, Option<String>),
+    /// Exposure at which the scene of this [`Request::load`] shows in its own light, in stops;
+    /// `None` where it does so without one.
+    Exposure(u64, Option<f64>),
     /// The scene of this [`Request::load`] could not be loaded; the previous one stays.
     LoadFailed(u64, String),
     /// Names of the Vulkan devices, by index.

@@ -19,4 +19,5 @@ mod obj;
 mod own;
 mod pointer;
 mod shared;
+mod sky;
 mod squares;

@@ -3,6 +3,7 @@
 use super::*;
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{DiffuseTransmission, Specular};
+use skylit::scene::sky::Sky;
 
 const ALBEDO: f32 = 0.6;
 const RHO: f64 = 0.6;
@@ -64,6 +65,30 @@ fn gpu_points_spots_and_directions() {
     all.lights.push(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     all.lights.push(light(spot, DVec3::Y, DVec3::NEG_Y, 5.0));
     holds(&device, "three lights", &all, &options(Strategy::Mis, 1024), reflected * (3.0 * 0.8 * 2.0 + 5.0), 1e-2);
+}
+
+/// A clear sky with its sun, on every tracer: a floor reflects what the host adds up of the map's rows, and the sun's irradiance times its cosine.
+#[test]
+fn gpu_a_clear_sky() {
+    let device = device();
+    let sky = Sky { elevation: 35.0, azimuth: 60.0, turbidity: 3.0 };
+    let (map, sun) = sky.light(0.5);
+    let sun = sun.expect("it is day");
+    let height = map.height as usize;
+    let below = |y: usize| (std::f64::consts::PI * y as f64 / height as f64).sin().powi(2);
+    let row = |y: usize| {
+        let row = &map.radiance[y * map.width as usize..][..map.width as usize];
+        let mean = row.iter().map(|c| (*c * map.factor).as_dvec3()).sum::<DVec3>() / row.len() as f64;
+        mean * std::f64::consts::PI * (below(y + 1) - below(y))
+    };
+    let by_sky = (0..height / 2).map(row).sum::<DVec3>().element_sum() / 3.0;
+    let by_sun = sun.intensity.as_dvec3().element_sum() / 3.0 * 35f64.to_radians().sin();
+    assert!(by_sky > 0.1 * by_sun && by_sun > by_sky);
+    let expected = RHO / std::f64::consts::PI * (by_sky + by_sun);
+    let mut scene = floor_and(Vec::new());
+    scene.lights.push(sun);
+    scene.environment = Environment::Map(map);
+    holds_with(&tracers(&device), 2e-4, &device, "a sky", &scene, &options(Strategy::Mis, 512), expected, 2e-3);
 }
 
 /// Light from below a floor that transmits diffusely: color times share times irradiance over pi, of every light and by every strategy; and light from above is reflected by the

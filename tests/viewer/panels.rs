@@ -565,6 +565,52 @@ fn images_are_environments() {
     assert!(alone.shows("broken.exr: not an image"));
 }
 
+/// The light of a file is shown at the exposure that it needs: once for a scene, unless there is one, and not for the next scene.
+#[test]
+fn light_of_a_file_is_exposed_once() {
+    let mut alone = loaded();
+    alone.change(|app| app.first = Technique::Still(skylit::integrators::IntegratorName::Path));
+    let exposure = |alone: &Alone| alone.mailbox.peek().panes[0].picture.exposure;
+    let send = |alone: &mut Alone, load, stops| {
+        alone.events.send(Event::Exposure(load, stops));
+        alone.harness.run_steps(2);
+    };
+    send(&mut alone, 7, Some(3.0));
+    assert_eq!(exposure(&alone), None, "of another load");
+    send(&mut alone, 1, Some(-6.0));
+    assert_eq!(exposure(&alone), Some(-6.0));
+    assert!(alone.shows("exposure -6 stops, for the light of the scene is far from a display's"));
+    send(&mut alone, 1, Some(5.0));
+    assert_eq!(exposure(&alone), Some(-6.0), "it does not follow the view");
+    alone.change(|app| app.settings.picture.exposure = None);
+    send(&mut alone, 1, Some(5.0));
+    assert_eq!(exposure(&alone), None, "the user has decided");
+
+    // another scene has its own
+    let open = |alone: &mut Alone, load: u64, source: &str| {
+        alone.change(|app| app.open(source));
+        let summary = SceneSummary { load, is_complete: true, source: source.into(), ..Default::default() };
+        alone.events.send(Event::Loaded(Box::new(summary)));
+        alone.harness.run_steps(2);
+    };
+    open(&mut alone, 2, "builtin:cornell-box");
+    send(&mut alone, 2, Some(4.0));
+    assert_eq!(exposure(&alone), Some(4.0));
+    open(&mut alone, 3, "builtin:stairs");
+    assert_eq!(exposure(&alone), None);
+    // one that needs none keeps none, wherever the camera goes
+    send(&mut alone, 3, None);
+    send(&mut alone, 3, Some(4.0));
+    assert_eq!(exposure(&alone), None);
+
+    let mut settings = RenderSettings::default();
+    settings.picture.exposure = Some(1.0);
+    let mut given = loaded_with(settings);
+    given.change(|app| app.first = Technique::Still(skylit::integrators::IntegratorName::Path));
+    send(&mut given, 1, Some(-6.0));
+    assert_eq!(exposure(&given), Some(1.0), "as it was given");
+}
+
 /// Lengths start from the scene's size, and those that were given are not changed by being shown.
 #[test]
 fn lengths_are_sane_and_stay() {

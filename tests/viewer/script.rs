@@ -82,6 +82,30 @@ wait 1",
     assert!(saved.f32("Y").is_some() && saved.f32("depth.Z").is_some() && saved.metadata("command").is_some());
 }
 
+/// A file whose light is candela and lux: the first path of it shows something, and says by which exposure; ambient occlusion has none.
+#[test]
+fn gpu_light_of_a_file_is_exposed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = skylit::scene::builtin::by_name("cornell-box").unwrap();
+    scene.materials.iter_mut().for_each(|m| m.emissive *= 1000.0);
+    let file = folder.path().join("bright.glb");
+    skylit::scene::export::export_gltf(&scene, &file).unwrap();
+    let text = "wait picture 500
+wait 0.3
+screenshot FOLDER/occlusion.png
+key 4
+wait text:exposure -
+wait samples 8 500
+screenshot FOLDER/path.png
+expect-no-errors";
+    run(Some(&file.to_string_lossy()), folder.path(), text).unwrap();
+    // the image is grey, and not white
+    let path = image::open(folder.path().join("path.png")).unwrap().into_rgb8();
+    let middle = path.enumerate_pixels().filter(|(x, y, _)| (100..400).contains(x) && (100..400).contains(y));
+    let (white, all) = middle.fold((0, 0), |(white, all), (_, _, p)| (white + u32::from(p.0 == [255; 3]), all + 1));
+    assert!(white * 4 < all, "{white} of {all} pixels are white");
+}
+
 #[test]
 fn gpu_tracers_are_switched_while_it_runs() {
     let folder = tempfile::tempdir().unwrap();

@@ -39,6 +39,7 @@ pub struct Interactive<'r> {
     kind: TracerKind,
     compute: ComputeOptions,
     settings: &'r DeviceSettings,
+    shows_own_light: bool,
     animation: Option<PlayedAnimation<'r>>,
     traced: Vec<TracedScene<'r>>,
     /// Number of tracers built so far.
@@ -98,6 +99,7 @@ impl Renderer {
             kind: self.kind,
             compute: self.compute,
             settings: &self.settings,
+            shows_own_light: *lighting == LightingSettings::default() && !self.lighting.is_automatic,
             animation,
             traced: Vec::new(),
             built: 0,
@@ -120,6 +122,11 @@ impl<'r> Interactive<'r> {
     /// The device.
     pub fn device(&self) -> &'r Arc<Device> {
         self.device
+    }
+
+    /// Whether the only light is that of the scene's file.
+    pub fn shows_own_light(&self) -> bool {
+        self.shows_own_light
     }
 
     /// The tracer in use.

@@ -302,8 +302,9 @@ fn light(app: &mut App, ui: &mut Ui) {
     }
 
     // the environment
-    let heading =
-        ui.label("Environment: a map (.hdr, .exr) or R,G,B").on_hover_text("Enter applies it; empty: the scene's own");
+    let heading = ui
+        .label("Environment: a map (.hdr, .exr), sky or R,G,B")
+        .on_hover_text("Enter applies it; empty: the scene's own");
     let id = ui.make_persistent_id("environment text");
     let current = app.lighting.environment.clone().unwrap_or_default();
     // what is typed is of the environment that there was, unless it has been replaced: by a file

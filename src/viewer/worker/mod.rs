@@ -23,9 +23,10 @@ use crate::integrators::lighting::LightingSettings;
 use crate::output::{self, ImageFormat};
 use crate::renderer::interactive::View;
 use crate::renderer::survey::Survey;
-use crate::renderer::{Interactive, Renderer};
+use crate::renderer::{Interactive, Renderer, brightness};
 use crate::scene::load::LoadOptions;
 use crate::scene::{Camera, Scene, SceneSettings};
+use crate::settings::Capability;
 use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
 
@@ -38,6 +39,8 @@ const SHARE: f64 = 0.6;
 const COMPARISON: Duration = Duration::from_millis(700);
 /// Time after which geometry is shown whose images are still being loaded.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// Samples per pixel from which an exposure is chosen: fewer leave many pixels black.
+const EXPOSURE_SAMPLES: u32 = 4;
 /// A comparison may take this share of the time.
 const COMPARISON_SHARE: u32 = 5;
 
@@ -327,6 +330,7 @@ impl Worker {
             first,
             refused,
             black: [Blackness::Unknown; TRUTH + 1],
+            knows_exposure: false,
         };
         session.run()
     }
@@ -353,6 +357,8 @@ struct ViewerSession<'a> {
     refused: Option<LightingSettings>,
     /// Knowledge whether each image at rest is black.
     black: [Blackness; TRUTH + 1],
+    /// The exposure of the scene's own light was sent.
+    knows_exposure: bool,
 }
 
 /// Whether an image at rest is black.
@@ -474,6 +480,7 @@ impl ViewerSession<'_> {
             Ok((step, time)) => {
                 let Some(picture) = pane.shown().map(|v| v.picture()).transpose()?.flatten() else { return Ok(()) };
                 let is_black = !moves && black::is_black(&picture);
+                let samples = step.samples;
                 let progress = Progress {
                     pane: request.pane(k),
                     picture: Arc::new(picture),
@@ -486,6 +493,7 @@ impl ViewerSession<'_> {
                 self.events.send(Event::Picture(Box::new(progress)));
                 if !moves {
                     self.explain_black(k, request, camera, is_black)?;
+                    self.choose_exposure(k, request, samples)?;
                 }
                 if self.panes[k].steps() == 1 {
                     self.events.send(Event::PaneError(request.pane(k), None));
@@ -524,6 +532,23 @@ impl ViewerSession<'_> {
             None
         };
         self.events.send(Event::Black(pane, reason));
+        Ok(())
+    }
+
+    /// Sends the exposure that the scene's own light needs, once a view of it has some samples.
+    fn choose_exposure(&mut self, k: usize, request: &Request, samples: u32) -> Result<()> {
+        let is_lit = request.panes[k].integrator().get().capabilities().contains(&Capability::SceneLights);
+        let is_due = !self.knows_exposure && k == 0 && is_lit && samples >= EXPOSURE_SAMPLES;
+        // without its images the scene has other colours
+        if !is_due || !self.interactive.shows_own_light() || self.loader.is_some() {
+            return Ok(());
+        }
+        let Some(values) = self.panes[k].shown().map(View::values).transpose()? else { return Ok(()) };
+        if values.channels == 3 {
+            self.knows_exposure = true;
+            let stops = brightness::exposure(&values.values, &values.coverage);
+            self.events.send(Event::Exposure(request.load, stops));
+        }
         Ok(())
     }
 
