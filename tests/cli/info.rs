@@ -38,7 +38,8 @@ fn gpu_a_camera_a_radius_and_an_exposure_are_suggested() {
 fn gpu_warnings_about_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let scene = place(&folder, "a.obj");
-    std::fs::write(&scene, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nwibble\nusemtl m\nf 1 2 3\nf 1 1 2\n").unwrap();
+    std::fs::write(&scene, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nwibble\nusemtl m\nf 1 2 3\nf 1 1 2\n")
+        .unwrap();
     let warnings = |args: &[&str]| {
         let out = run(args);
         assert!(out.status.success(), "{}", stderr(&out));
@@ -62,7 +63,9 @@ fn gpu_warnings_about_a_file() {
     let shown = warnings(&render);
     let about_file: Vec<_> = shown.iter().filter(|w| listed.iter().any(|l| w.starts_with(l.as_str()))).collect();
     assert_eq!(about_file.len(), 1, "{shown:?}");
-    assert!(about_file[0].starts_with(&listed[0]) && about_file[0].contains("(and 3 more about the file: `skylit info"));
+    assert!(
+        about_file[0].starts_with(&listed[0]) && about_file[0].contains("(and 3 more about the file: `skylit info")
+    );
     let record = json(&run(&[&render[..], &["--json"]].concat()));
     assert!(record["warnings"].as_array().unwrap().len() >= 4, "{record}");
 }

@@ -13,7 +13,7 @@ use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{
     AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Retroreflection, Sheen, Specular, TextureSlot,
-    Transmission,
+    Transmission, VolumeScatter,
 };
 use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
 
@@ -57,6 +57,7 @@ fn everything() -> Scene {
         attenuation_distance: 1.0,
         ..Default::default()
     };
+    let volume_scatter = VolumeScatter { color: Vec3::splat(0.5), anisotropy: 0.3 };
     let masked = Material { base_color_texture: slot, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..matte(0.5) };
     let sphere = Geometry::Spheres(vec![Sphere { center: Vec3::new(0.0, 2.0, -1.0), radius: 0.5 }]);
     let at = |y: f64| shapes::rectangle(DVec3::new(0.0, y, -0.5), DVec3::X, DVec3::Z);
@@ -71,7 +72,10 @@ fn everything() -> Scene {
     for (geometry, material) in [
         (turned, textured),
         (triangle.clone(), masked),
-        (triangle.clone(), Material { transmission: body, roughness: 0.3, ..Material::default() }),
+        (
+            triangle.clone(),
+            Material { transmission: body, volume_scatter, dispersion: 0.5, roughness: 0.3, ..Material::default() },
+        ),
         (triangle.clone(), Material { unlit: true, ..Material::default() }),
         (triangle, emitter(1.0)),
         (at(3.0), emitter(1.0)),
