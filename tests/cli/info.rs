@@ -38,7 +38,8 @@ fn gpu_a_camera_a_radius_and_an_exposure_are_suggested() {
 fn gpu_warnings_about_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let scene = place(&folder, "a.obj");
-    std::fs::write(&scene, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nwibble\nusemtl m\nf 1 2 3\nf 1 1 2\n").unwrap();
+    std::fs::write(&scene, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nwibble\nusemtl m\nf 1 2 3\nf 1 1 2\n")
+        .unwrap();
     let warnings = |args: &[&str]| {
         let out = run(args);
         assert!(out.status.success(), "{}", stderr(&out));
@@ -53,7 +54,7 @@ fn gpu_warnings_about_a_file() {
     refuses(&["info", &scene, "--no-device", "--uv", "flat"], 64, "spherical");
     let out = run(&["info", &scene, "--no-device", "--normals", "30"]);
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
-    assert!(text.contains("normals of 1 meshes: computed from their triangles (--normals)"), "{text}");
+    assert!(text.contains("normals of 1 mesh: computed from triangles (--normals)"), "{text}");
     if !device() {
         return;
     }
@@ -62,7 +63,9 @@ fn gpu_warnings_about_a_file() {
     let shown = warnings(&render);
     let about_file: Vec<_> = shown.iter().filter(|w| listed.iter().any(|l| w.starts_with(l.as_str()))).collect();
     assert_eq!(about_file.len(), 1, "{shown:?}");
-    assert!(about_file[0].starts_with(&listed[0]) && about_file[0].contains("(and 3 more about the file: `skylit info"));
+    assert!(
+        about_file[0].starts_with(&listed[0]) && about_file[0].contains("(and 3 more about the file: `skylit info")
+    );
     let record = json(&run(&[&render[..], &["--json"]].concat()));
     assert!(record["warnings"].as_array().unwrap().len() >= 4, "{record}");
 }
