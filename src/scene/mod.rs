@@ -95,11 +95,12 @@ impl LoadReport {
         self.warnings.iter().cloned().chain(dropped).collect()
     }
 
-    /// What options have made of the meshes, a line each.
+    /// Sentences about what options have made of the meshes.
     pub fn remarks(&self) -> Vec<String> {
-        let line = |count: usize, text: &str| (count > 0).then(|| text.replace('#', &count.to_string()));
-        let normals = line(self.normals_replaced, "normals of # meshes: computed from their triangles (--normals)");
-        let uv = line(self.texcoords_projected, "texture coordinates of # meshes without any: projected (--uv)");
+        let meshes = |count: usize| if count == 1 { "1 mesh".to_owned() } else { format!("{count} meshes") };
+        let [normals, uv] = [self.normals_replaced, self.texcoords_projected].map(|n| (n > 0).then(|| meshes(n)));
+        let normals = normals.map(|meshes| format!("normals of {meshes}: computed from triangles (--normals)"));
+        let uv = uv.map(|meshes| format!("texture coordinates of {meshes} without any: projected (--uv)"));
         normals.into_iter().chain(uv).collect()
     }
 }

@@ -54,7 +54,7 @@ fn gpu_warnings_about_a_file() {
     refuses(&["info", &scene, "--no-device", "--uv", "flat"], 64, "spherical");
     let out = run(&["info", &scene, "--no-device", "--normals", "30"]);
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
-    assert!(text.contains("normals of 1 meshes: computed from their triangles (--normals)"), "{text}");
+    assert!(text.contains("normals of 1 mesh: computed from triangles (--normals)"), "{text}");
     if !device() {
         return;
     }

@@ -49,7 +49,7 @@ impl FromStr for NormalSource {
     }
 }
 
-/// What vertices get in place of what the file says of them, or where it says nothing.
+/// Attributes of vertices that replace the file's, or that it lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VertexOptions {
     /// Shading normals.

@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn each_side_of_a_box_is_upright() {
-        // the corner that is up and right as seen from outside, of a triangle that faces along a side
+        // right and up as seen from outside of a triangle that faces along a side
         for (normal, right, up) in [
             (Vec3::Z, Vec3::X, Vec3::Y),
             (Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y),

@@ -49,7 +49,7 @@ impl MapChannel {
         }
     }
 
-    /// Its value of a texel.
+    /// The value of this channel in a texel.
     pub fn value(self, [r, g, b, a]: [f32; 4]) -> f32 {
         match self {
             Self::Red => r,
@@ -373,7 +373,7 @@ mod tests {
         assert_eq!(warnings, ["line 3: map_Xs is not used", "line 4: disp is not used"]);
     }
 
-    /// Statements and options without an effect are named; those that say what is so anyway are not.
+    /// Statements and options without an effect are named, unless they say what is so anyway.
     #[test]
     fn what_is_not_used_is_named() {
         let mut warnings = Vec::new();

@@ -142,6 +142,8 @@ impl Parser {
         let line = trim(line);
         let (key, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
         let rest = trim(rest);
+
+        // by the first word
         match key {
             "v" => self.vertex(rest),
             "vt" => {

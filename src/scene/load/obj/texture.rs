@@ -191,7 +191,8 @@ impl<'a> Textures<'a> {
         });
         let named = files.iter().zip(&pictures).find_map(|(file, picture)| file.as_ref().filter(|_| picture.is_some()));
         let name = named?.1.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // what two maps are combined to has a texel for each of the larger one; normals have 16 bits
+        // what two maps are combined to has a texel for each of the larger one; normals of heights
+        // have 16 bits
         let bytes = if texels == Texels::Heights { 8 } else { 4 };
         let count = pictures.iter().flatten().map(|(_, p)| u64::from(p.width) * u64::from(p.height)).max().unwrap_or(0);
         self.loading.budget.take(bytes * count, || format!("the texture {name}")).ok()?;
