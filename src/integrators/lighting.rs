@@ -27,7 +27,7 @@ settings! {
         ///
         /// `sky:ELEVATION,AZIMUTH,TURBIDITY` says where the sun is, -6 to 90 degrees above the
         /// horizon and in degrees clockwise from -z, and how hazy the air is, 1 to 10; numbers may
-        /// be left out from the end [40,215,3]. A radiance of 1 is 20,000 candela per square metre.
+        /// be left out from the end [35,215,2.5]. A radiance of 1 is 25,000 candela per square metre.
         ///
         /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in
         /// a closed room, and the render prints them as options; `none` leaves it dark.

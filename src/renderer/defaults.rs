@@ -348,6 +348,20 @@ mod tests {
     }
 
     #[test]
+    fn only_files_have_a_folder() {
+        let environment = |text: &str| {
+            let file = file("/u/skylit.toml", &format!("[lighting]\nenvironment = \"{text}\""));
+            file.settings.lighting.environment.unwrap()
+        };
+        for text in ["none", "1,2,3", "sky", "sky:20,90"] {
+            assert_eq!(environment(text), text);
+        }
+        assert_eq!(environment("./sky"), "/u/./sky");
+        let wrong = DefaultsFile::parse(Path::new("/u/skylit.toml"), "[lighting]\nenvironment = \"sky:99\"");
+        assert!(wrong.unwrap_err().to_string().contains("elevation '99'"));
+    }
+
+    #[test]
     fn later_files_and_options_replace_earlier_files() {
         let user = file(
             "/u/skylit.toml",

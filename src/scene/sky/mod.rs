@@ -11,7 +11,7 @@ use crate::settings::parse::parse_number;
 use atmosphere::Atmosphere;
 
 /// Luminance of a radiance of 1, in candela per square metre.
-pub const UNIT: f64 = 20_000.0;
+pub const UNIT: f64 = 25_000.0;
 /// Angular diameter of the sun in degrees.
 pub const SUN_DIAMETER: f64 = 0.5332;
 
@@ -32,7 +32,7 @@ pub struct Sky {
 impl Default for Sky {
     /// The sun is to the left of and behind a camera that looks towards -z.
     fn default() -> Self {
-        Self { elevation: 40.0, azimuth: 215.0, turbidity: 3.0 }
+        Self { elevation: 35.0, azimuth: 215.0, turbidity: 2.5 }
     }
 }
 
