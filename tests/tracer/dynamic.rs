@@ -327,6 +327,7 @@ fn gpu_bad_changes_are_refused_and_change_nothing() {
                 .position(|m| matches!(m.geometry, Geometry::Spheres(_)))
                 .into_iter()
                 .collect(),
+            ..Motion::default()
         },
     ] {
         assert!(matches!(FlatScene::with_motion(&spheres, motion), Err(Error::Usage(_))));
