@@ -89,7 +89,7 @@ pub struct UpdateStats {
     /// Bounds of what moved or deformed.
     #[serde(skip)]
     pub moved: Vec<MovedBounds>,
-    /// What of materials changed.
+    /// The change of materials.
     #[serde(skip)]
     pub materials: MaterialChange,
 }
@@ -238,6 +238,7 @@ impl Dynamic {
                 ways.insert(group, (before, way));
             }
         }
+
         // of two transforms for one instance the last counts
         let latest: HashMap<usize, DAffine3> = moved.iter().copied().collect();
         let mut out = Vec::new();

@@ -34,7 +34,7 @@ pub(super) struct MipStats {
     pub bytes: u64,
 }
 
-/// What a change of materials is about, the least first.
+/// A change of materials, the least first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MaterialChange {
     /// Nothing has changed.
@@ -50,7 +50,7 @@ pub enum MaterialChange {
 struct MaterialWriter {
     textures: TextureSlots,
     needs: Needs,
-    /// Those of [`shading::indices_of_refraction`].
+    /// The numbers of [`shading::indices_of_refraction`].
     indices: Vec<f32>,
     blend: Blend,
 }

@@ -520,4 +520,21 @@ mod tests {
         let frames = Manifest::load(dir.path()).unwrap().frames;
         assert!(frames.len() == 1 && frames[0].tolerance.z_test.is_some(), "{frames:?}");
     }
+
+    #[test]
+    fn a_scene_of_a_gltf_file_is_chosen() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("hall.glb"), "").unwrap();
+        let text = EXAMPLE.replace("scene = \"hall.glb\"", "scene = \"hall.glb\", gltf_scene = \"at night\"");
+        std::fs::write(dir.path().join(NAME), text.replace("--spp 64", "--spp 64 --variant red")).unwrap();
+        let frames = Manifest::load(dir.path()).unwrap().frames;
+        assert_eq!((frames[0].problem.as_ref(), frames[0].gltf_scene.as_deref()), (None, Some("at night")));
+        let render = frames[0].render_text();
+        assert!(render.starts_with("--gltf-scene 'at night' ") && render.contains("--variant red"), "{render}");
+
+        // no other format has several
+        std::fs::write(dir.path().join(NAME), text.replace("hall.glb", "builtin:plane")).unwrap();
+        let problem = Manifest::load(dir.path()).unwrap().frames[0].problem.clone().unwrap();
+        assert!(problem.contains("line 1: gltf_scene: builtin:plane is no glTF file"), "{problem}");
+    }
 }

@@ -18,6 +18,7 @@ mod emitters;
 mod film;
 mod frames;
 mod furnace;
+mod image_light;
 mod lag;
 mod light_groups;
 mod lit;

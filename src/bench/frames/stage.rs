@@ -109,7 +109,7 @@ pub struct FrameInputs {
     pub to_map: Option<DMat3>,
     /// The scene in its pose, if that moves lights.
     pub posed: Option<Arc<Scene>>,
-    /// What of materials has changed.
+    /// The change of materials.
     pub materials: MaterialChange,
     /// The time of updating the tracer, where objects move.
     pub update_seconds: Option<f64>,
@@ -200,6 +200,7 @@ impl<'a> SceneStage<'a> {
 
     /// Brings scene, camera and light to a frame. Frames need not come in order.
     pub fn move_to(&mut self, motion: &mut Motion, frame: u32) -> Result<FrameInputs> {
+        // what stands still
         let camera = self.still_camera();
         if !motion.moves_objects() {
             self.rest()?;
@@ -213,6 +214,8 @@ impl<'a> SceneStage<'a> {
             materials: Default::default(),
         };
         let seconds = |update: &UpdateStats| Some(update.mesh_seconds + update.top_seconds);
+
+        // what moves
         Ok(match motion {
             Motion::Orbit(orbit) => {
                 inputs(self.camera_record(&orbit.camera_at(self.camera, f64::from(frame))), Vec::new(), None)

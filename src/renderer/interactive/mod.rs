@@ -70,7 +70,7 @@ struct TracedScene<'r> {
     moved: Vec<MovedBounds>,
     /// The scene in its pose, if the animation moves lights or surfaces that emit light.
     posed: Option<Box<Scene>>,
-    /// What of materials the last change of pose has changed.
+    /// The change of materials by the last change of pose.
     materials: MaterialChange,
 }
 

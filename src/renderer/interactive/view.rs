@@ -258,6 +258,7 @@ impl View {
         time: Duration,
         control: &mut dyn Control,
     ) -> Result<ViewStep> {
+        // whether the camera or the scene has moved
         let gone = || Error::Usage("the view's scene is no longer loaded".into());
         let traced = session.find_traced(self.scene_number).ok_or_else(gone)?;
         let has_moved = self.pose != traced.pose;
@@ -265,6 +266,8 @@ impl View {
         self.camera = Some(camera.clone());
         self.pose = traced.pose;
         let aspect = self.aspect();
+
+        // a frame, or samples of a still
         match &mut self.kind {
             Kind::Frames(view) => {
                 let record = CameraRecord::new(camera, traced.flat.origin, aspect);

@@ -363,7 +363,7 @@ impl CameraProperty {
     }
 }
 
-/// What a channel of values animates.
+/// The target of a channel of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
     /// A property of a material, an index into [`super::RigParts::materials`].

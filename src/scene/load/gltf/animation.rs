@@ -77,7 +77,7 @@ pub(super) fn pointers(animations: &[Animation]) -> impl Iterator<Item = &str> {
 /// A channel that has been read.
 enum ReadChannel {
     Node(Channel),
-    /// Its target refers to the file's materials, lights, cameras and to placed nodes.
+    /// A channel whose target is a material, light or camera of the file, or a placed node.
     Value(ValueChannel),
 }
 
@@ -183,7 +183,7 @@ fn read_channel(
     Ok(Some(ReadChannel::Node(Channel { node, property, sampler: sampler? })))
 }
 
-/// What a channel with a pointer is.
+/// The target of a channel with a pointer.
 enum PointerTarget {
     Value(Target),
     /// A node, as without a pointer.

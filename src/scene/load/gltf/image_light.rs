@@ -182,7 +182,8 @@ fn basis(d: DVec3) -> [f64; 9] {
 mod tests {
     use super::*;
 
-    /// A linear environment, 1 + d.x / 2 in red and 1 + d.z / 2 in green: its coefficients of irradiance are known, and so is what comes back.
+    /// The coefficients of a linear environment, 1 + d.x / 2 in red and 1 + d.z / 2 in green, are
+    /// known.
     #[test]
     fn harmonics_bring_back_the_radiance() {
         let mut coefficients = vec![[0.0; 3]; 9];

@@ -14,7 +14,7 @@ use crate::scene::animation::{
     AnimatedMaterial, CameraProperty, LightProperty, MaterialProperty as Number, SLOTS, TextureTransform,
 };
 
-/// What a pointer names.
+/// The property that a pointer names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pointer<'p> {
     /// A node, and the path of a channel that targets it without a pointer.
@@ -107,6 +107,8 @@ fn material(property: &str) -> Option<Number> {
             _ => return None,
         });
     }
+
+    // the core, then its extensions
     let Some(extension) = property.strip_prefix("extensions/KHR_materials_") else {
         return Some(match property {
             "pbrMetallicRoughness/baseColorFactor" => Number::BaseColor,
@@ -195,8 +197,8 @@ mod tests {
                 Pointer::Material(0, MaterialProperty::TextureOffset(0)),
             ),
             (
-                "/materials/1/extensions/KHR_materials_sheen/sheenRoughnessTexture/extensions/KHR_texture_transform/scale",
-                Pointer::Material(1, MaterialProperty::TextureScale(9)),
+                "/materials/1/occlusionTexture/extensions/KHR_texture_transform/scale",
+                Pointer::Material(1, MaterialProperty::TextureScale(3)),
             ),
             (
                 "/extensions/KHR_lights_punctual/lights/1/spot/outerConeAngle",

@@ -364,6 +364,8 @@ impl RigBuilder<'_> {
         let with_number = |numbers: &[usize], k: usize| -> Vec<usize> {
             numbers.iter().enumerate().filter(|(_, n)| **n == k).map(|(i, _)| i).collect()
         };
+
+        // each once, when the first channel names it
         for channel in self.animations.iter_mut().flat_map(|a| &mut a.values) {
             channel.target = match channel.target {
                 Target::Visibility(at) => Target::Visibility(number[at]),
