@@ -89,8 +89,9 @@ pub(super) fn smooth(meshes: &mut [&mut TriangleMesh], max_angle: f64) -> Vec<Ve
         let Split { source, keys } = split(mesh, |corner| find(&mut groups, (first + corner) as u32));
         let normal = |root: Option<u32>| {
             root.map_or(Vec3::Z, |root| {
-                let sum = sums[root as usize].try_normalize();
-                sum.unwrap_or(normals[root as usize / 3]).as_vec3()
+                // a triangle without an area has no normal, and will not be seen
+                let own = Some(normals[root as usize / 3]).filter(|n| *n != DVec3::ZERO);
+                sums[root as usize].try_normalize().or(own).unwrap_or(DVec3::Z).as_vec3()
             })
         };
         mesh.normals = keys.into_iter().map(normal).collect();
