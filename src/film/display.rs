@@ -82,7 +82,7 @@ impl DisplayErrors {
             if samples == before || !is_check(samples) {
                 continue;
             }
-            let (mut sum, mut count) = (0.0, 0);
+            let (mut sum, mut count) = (0.0, 0usize);
             let [x, y] = [tile % width, tile / width].map(|n| (n * TILE as usize) as u32);
             for index in (y..film.height.min(y + TILE))
                 .flat_map(|y| (x..film.width.min(x + TILE)).map(move |x| y as usize * film.width as usize + x as usize))
@@ -93,15 +93,13 @@ impl DisplayErrors {
                 let mut linear = [[0.0; MAX_CHANNELS]; 2];
                 halves.enumerate().for_each(|(c, values)| (0..2).for_each(|half| linear[half][c] = values[half]));
                 let [first, second] = linear.map(|colour| self.target.shown(gain, film.channels, colour));
-                for c in 0..film.channels {
-                    sum += (0.5 * f64::from(second[c] - first[c])).powi(2);
-                    count += 1;
-                }
+                let differences = first.iter().zip(&second).take(film.channels).map(|(a, b)| f64::from(b - a));
+                sum += differences.map(|difference| 0.25 * difference * difference).sum::<f64>();
+                count += film.channels;
                 old.copy_from_slice(now);
             }
             self.checked[tile] = samples;
-            let error =
-                if before > 0 && samples == 2 * before { (sum / f64::from(count)).sqrt() } else { f64::INFINITY };
+            let error = if before > 0 && samples == 2 * before { (sum / count as f64).sqrt() } else { f64::INFINITY };
             self.tiles.set(tile, error);
         }
     }
