@@ -118,7 +118,7 @@ fn luminance_is_shared_out_as_in_the_standard_clear_sky() {
     let gradation = |zenith: f64| 1.0 - (-0.32 / zenith.cos()).exp();
     let indicatrix = |chi: f64| 1.0 + 10.0 * ((-3.0 * chi).exp() - (-3.0 * FRAC_PI_2).exp()) + 0.45 * chi.cos().powi(2);
     let sun_zenith = (90.0 - elevation).to_radians();
-    let (mut sum, mut count, mut worst) = (0.0, 0.0, 1.0f64);
+    let (mut sum, mut count, mut worst) = (0.0f64, 0.0, 1.0f64);
     for height in [15.0f64, 30.0, 45.0, 60.0, 75.0] {
         for azimuth in (0..=180).step_by(30).map(f64::from) {
             let zenith = (90.0 - height).to_radians();
@@ -135,7 +135,7 @@ fn luminance_is_shared_out_as_in_the_standard_clear_sky() {
             worst = worst.max(factor(found, expected));
         }
     }
-    let mean = (sum / count as f64).exp();
+    let mean = (sum / count).exp();
     println!("over the standard: mean {mean:.3}, worst factor {worst:.3}");
     assert!(factor(mean, 1.0) < 1.15 && worst < 1.3, "{mean} {worst}");
 }
