@@ -17,7 +17,7 @@ fn lit_scene(folder: &std::path::Path, greys: [u8; 6], intensity: f64) -> Scene 
     std::fs::write(folder.join("triangle.bin"), &bin).unwrap();
     let light = json!({
         "intensity": intensity,
-        "irradianceCoefficients": [[0; 3]; 9],
+        "irradianceCoefficients": vec![[0; 3]; 9],
         "specularImages": [[0, 1, 2, 3, 4, 5]],
         "specularImageSize": 16,
     });
