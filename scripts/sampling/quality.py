@@ -4,8 +4,8 @@
 
 Errors are RMSE against an image of twice --most samples and another seed, whose own noise is in all of them: of sRGB values in steps of 8 bits, at the exposure of
 the picture, and of linear values. Errors of fixed numbers of samples are measured at powers of two up to --most and interpolated between them. Bias is the mean
-of the difference. Then a quality and the fixed number of samples with the same displayed error are rendered in turn: processor
-seconds, which other work on the machine hardly changes, and whole seconds, medians.
+of the difference. Then a quality and the fixed number of samples with the same displayed error are rendered in turn: rays, which
+tiles without geometry have none of, processor seconds, which other work on the machine hardly changes, and whole seconds, medians.
 Needs numpy and OpenEXR."""
 import argparse
 import json
@@ -94,10 +94,11 @@ def study(program, name, line, arguments, folder):
             for key, options in contestants.items():
                 before = processor_seconds()
                 timed = render(program, line, path, "--seed", SEED, *size, *options)
-                times[key].append((processor_seconds() - before, timed["seconds"]["total"]))
-        processor, whole = ({key: statistics.median(t[k] for t in times[key]) if times[key] else float("nan") for key in times} for k in (0, 1))
+                rays = sum(count for kind, count in timed["rays"].items() if not kind.startswith("skipped"))
+                times[key].append((rays, processor_seconds() - before, timed["seconds"]["total"]))
+        traced, processor, whole = ({key: statistics.median(t[k] for t in times[key]) for key in times} for k in range(3))
         print(f"| {name} | {quality} | {255 * film['quality']['error']:.2f} | {displayed:.2f} | {mean:.1f} ({samples.min():.0f} to {samples.max():.0f}) | {wanted:.0f} | "
-              f"{wanted / mean:.2f} | {wanted_linear / mean:.2f} | {processor['fixed'] / processor['quality']:.2f} | {whole['fixed'] / whole['quality']:.2f} | "
+              f"{wanted / mean:.2f} | {wanted_linear / mean:.2f} | {traced['fixed'] / traced['quality']:.2f} | {processor['fixed'] / processor['quality']:.2f} | {whole['fixed'] / whole['quality']:.2f} | "
               f"{displayed_bias:+.3f} | {100 * linear_bias / reference.linear.mean():+.2f} % | {len(film['quality']['limited_tiles'])} of {film['tiles']['all']} |", flush=True)
 
 
@@ -114,8 +115,8 @@ def main():
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--most", type=int, default=1024)
     arguments = parser.parse_args()
-    print("| scene | quality | announced | RMSE | samples | fixed samples of the same RMSE | ratio | ratio, linear RMSE | processor time | whole time | bias | linear bias | tiles with all samples |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| scene | quality | announced | RMSE | samples | fixed samples of the same RMSE | ratio | ratio, linear RMSE | rays | processor time | whole time | bias | linear bias | tiles with all samples |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for scene in arguments.scenes:
         name, line = scene.split("=", 1)
         with tempfile.TemporaryDirectory() as folder:
