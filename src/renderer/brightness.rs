@@ -35,10 +35,10 @@ pub fn film_exposure(film: &Film) -> Option<f64> {
     exposure(&film.mean, &film.coverage)
 }
 
-/// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms, or at
-/// which the brightest twentieth becomes white if that is less; `None` where that is near to what is
-/// shown anyway, and where no surface has light. Reinhard,
-/// Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
+/// Exposure, in whole stops, at which surfaces are middle grey on average of their logarithms, or
+/// at which the brightest twentieth becomes white if that is less; `None` where that is near to
+/// what is shown anyway, and where no surface has light. Reinhard, Stark, Shirley, Ferwerda,
+/// "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002.
 ///
 /// `rgb` has three values a pixel, linear; `coverage` is the share of a pixel that surfaces cover.
 pub fn exposure(rgb: &[f32], coverage: &[f32]) -> Option<f64> {

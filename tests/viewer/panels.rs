@@ -565,11 +565,15 @@ fn images_are_environments() {
     assert!(alone.shows("broken.exr: not an image"));
 }
 
+fn path() -> Technique {
+    Technique::Still(skylit::integrators::IntegratorName::find("path").unwrap())
+}
+
 /// The light of a file is shown at the exposure that it needs: once for a scene, unless there is one, and not for the next scene.
 #[test]
 fn light_of_a_file_is_exposed_once() {
     let mut alone = loaded();
-    alone.change(|app| app.first = Technique::Still(skylit::integrators::IntegratorName::find("path").expect("an integrator")));
+    alone.change(|app| app.first = path());
     let exposure = |alone: &Alone| alone.mailbox.peek().panes[0].picture.exposure;
     let send = |alone: &mut Alone, load, stops| {
         alone.events.send(Event::Exposure(load, stops));
@@ -606,7 +610,7 @@ fn light_of_a_file_is_exposed_once() {
     let mut settings = RenderSettings::default();
     settings.picture.exposure = Some(1.0);
     let mut given = loaded_with(settings);
-    given.change(|app| app.first = Technique::Still(skylit::integrators::IntegratorName::find("path").expect("an integrator")));
+    given.change(|app| app.first = path());
     send(&mut given, 1, Some(-6.0));
     assert_eq!(exposure(&given), Some(1.0), "as it was given");
 }

@@ -165,8 +165,8 @@ records! {
         pdf: float,
         /// Index of its camera ray.
         index: uint,
-        /// Number of bounces in the lower 15 bits, above it whether the path has one wavelength, and
-        /// in the upper 16 the number of surfaces passed straight.
+        /// Number of bounces in the lower 15 bits, above it whether the path has one wavelength,
+        /// and in the upper 16 the number of surfaces passed straight.
         depth_passes: uint,
         /// Product of the squared relative indices of refraction; Russian roulette divides it out.
         eta_scale: float,

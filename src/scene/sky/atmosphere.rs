@@ -198,8 +198,8 @@ impl Atmosphere {
         bilinear(&self.scattered, SCATTERED, at, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t as f32))
     }
 
-    /// An entry of the table of multiple scattering: light that is scattered twice, times the sum of
-    /// the series of what follows (Hillaire 2020, equations 5 to 10).
+    /// An entry of the table of multiple scattering: light that is scattered twice, times the sum
+    /// of the series of what follows (Hillaire 2020, equations 5 to 10).
     fn scattered_at(&self, height: usize, sun: usize) -> Spectrum {
         let share = |k: usize, of: usize| k as f64 / (of - 1) as f64;
         let radius = GROUND + ((TOP - GROUND) * share(height, SCATTERED[0]).powi(2)).max(EYE);
@@ -428,8 +428,8 @@ mod tests {
         }
     }
 
-    /// Bucholtz, "Rayleigh-scattering calculations for the terrestrial atmosphere", 1995, at 550 nm;
-    /// and Beer's law, without what absorbs.
+    /// Bucholtz, "Rayleigh-scattering calculations for the terrestrial atmosphere", 1995, at
+    /// 550 nm; and Beer's law.
     #[test]
     fn air_has_its_optical_thickness() {
         assert!((air_thickness(550.0) / 0.0972 - 1.0).abs() < 0.01);
