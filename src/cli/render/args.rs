@@ -24,7 +24,7 @@ use crate::tracer::DeviceSettings;
 const EXAMPLES: &str = "\
 Examples:
   skylit render scene.glb -o ao.png                                 ambient occlusion
-  skylit render room.glb -o ao.png --ao-radius 0.5                  of a room: hits within half a metre
+  skylit render room.glb -o ao.png --ao-radius 0.5                  of a room: hits within 0.5 m
   skylit render scene.glb -o path.png --integrator path --quality good  path tracing
   skylit render scene.glb -o path.png --integrator path --denoise   path tracing, denoised
   skylit render scene.glb -o ao.png --eye 3,2,5 --target 0,1,0      from here
