@@ -52,7 +52,7 @@ fn gpu_thick_volumes_reflect_as_chandrasekhar_says() {
             ..scene_of(vec![(cube, volume(1.0, 200.0, color, 0.0))], camera)
         };
         let flat = FlatScene::for_paths(&scene);
-        let options = PathOptions { samples: SampleSettings::new([16, 16], 256, 5), ..Default::default() };
+        let options = PathOptions { samples: SampleSettings::new([16, 16], 96, 5), ..Default::default() };
         for kind in picked(&device) {
             let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
             for c in 0..3 {
@@ -61,9 +61,9 @@ fn gpu_thick_volumes_reflect_as_chandrasekhar_says() {
                 let (plane, variance) = (film.plane(c), film.variance_plane(c));
                 let n = plane.len() as f64;
                 let mean = plane.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-                let error = (variance.iter().map(|&v| f64::from(v)).sum::<f64>() / n / (n * 256.0)).sqrt();
+                let error = (variance.iter().map(|&v| f64::from(v)).sum::<f64>() / n / (n * 96.0)).sqrt();
                 println!("cosine {cosine}, channel {c}, {kind}: {mean:.5} +- {error:.5}, expected {expected:.5}");
-                assert!(error < 0.01 * expected, "{error} says nothing about {expected}");
+                assert!(error < 0.015 * expected, "{error} says nothing about {expected}");
                 assert!((mean - expected).abs() < 4.5 * error + 1e-3 * expected, "{kind}: {mean}, expected {expected}");
             }
         }
@@ -75,7 +75,7 @@ fn gpu_thick_volumes_reflect_as_chandrasekhar_says() {
 fn gpu_thin_volumes_scatter_by_their_anisotropy() {
     let device = device();
     let (depth, density, many) = (0.1, 0.2, 0.02);
-    for g in [-0.6, 0.0, 0.6f64] {
+    for g in [-0.6, 0.3f64] {
         let slab = shapes::cuboid(DVec3::new(-50.0, -50.0, -depth), DVec3::new(50.0, 50.0, 0.0));
         let sky = shapes::rectangle(DVec3::new(0.0, 0.0, 10.0), DVec3::X * 10_000.0, DVec3::Y * 10_000.0);
         let light = Material { emissive: Vec3::ONE, double_sided: true, ..matte(0.0) };
@@ -104,11 +104,11 @@ fn gpu_thin_volumes_scatter_by_their_anisotropy() {
 #[test]
 fn gpu_white_volumes_disappear() {
     let device = device();
-    let options = furnace::options(128, Strategy::Mis);
+    let options = furnace::options(64, Strategy::Mis);
     for (ior, density, anisotropy) in [(1.0, 3.0, 0.0), (1.5, 2.0, 0.8), (1.33, 8.0, -0.4)] {
         let what = format!("index {ior}, {density} per unit, anisotropy {anisotropy}");
         let scene = furnace::furnace(volume(ior, density, Vec3::ONE, anisotropy));
-        holds_but_for(3e-3, &device, &what, &scene, &options, 1.0, 3e-3);
+        holds_but_for(3e-3, &device, &what, &scene, &options, 1.0, 5e-3);
     }
     // light that a Lambertian surface lets in and out; without an index, beyond whose critical angle rough microfacets of one bounce lose some
     let wax = |ior, color| Material {
