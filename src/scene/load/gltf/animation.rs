@@ -177,7 +177,7 @@ fn read_channel(
 
     let sampler = match property {
         // as many scalars as there are targets
-        Property::Weights => read_scalars(reader, animation, channel, width, times, repairs),
+        Property::Weights => read_keys(reader, animation, channel, (Type::Scalar, width), times, repairs),
         _ => read_sampler(reader, animation, channel, width, times, repairs),
     };
     Ok(Some(ReadChannel::Node(Channel { node, property, sampler: sampler? })))
@@ -231,18 +231,6 @@ fn read_sampler(
         _ => Type::Vec4,
     };
     read_keys(reader, animation, channel, (shape, width), times, repairs)
-}
-
-/// The sampler of a channel whose values are `width` scalars.
-fn read_scalars(
-    reader: &Reader,
-    animation: &Animation,
-    channel: &ChannelJson,
-    width: usize,
-    times: &mut BTreeMap<u32, Arc<[f32]>>,
-    repairs: &mut Vec<String>,
-) -> Result<Sampler, String> {
-    read_keys(reader, animation, channel, (Type::Scalar, width), times, repairs)
 }
 
 /// The keys of a channel. `shape`: the type of its output, and how many numbers a value has.
