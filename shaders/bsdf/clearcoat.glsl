@@ -1,4 +1,4 @@
-// A clear layer over everything else (KHR_materials_clearcoat): GGX of index 1.5 about a normal of its own. Part of bsdf/bsdf.glsl.
+// A clear layer over everything else (KHR_materials_clearcoat): GGX of index 1.5 about a normal of its own. Part of bsdf/gltf.glsl.
 #ifndef BSDF_CLEARCOAT
 #define BSDF_CLEARCOAT
 

@@ -1,5 +1,5 @@
 // A thin film over the interface of a glTF material (KHR_materials_iridescence): Belcour and Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying
-// Iridescence", SIGGRAPH 2017. Part of bsdf/bsdf.glsl.
+// Iridescence", SIGGRAPH 2017. Part of bsdf/gltf.glsl.
 //
 // Light is reflected at the film's upper face, or after any number of reflections between its faces; the parts interfere. Their sum is a series of cosines of the phase, which
 // is integrated over wavelengths in closed form: the spectral sensitivities of the eye are sums of Gaussians, whose Fourier transforms are Gaussians (the paper's section 4).

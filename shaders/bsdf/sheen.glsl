@@ -1,5 +1,5 @@
 // Fibres that stand on a surface (KHR_materials_sheen): Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", 2017. Part of
-// bsdf/bsdf.glsl.
+// bsdf/gltf.glsl.
 #ifndef BSDF_SHEEN
 #define BSDF_SHEEN
 

@@ -1,6 +1,6 @@
 // The mean over a pixel's neighbours on the same surface, weighted by their samples, so that pixels without samples get their value
 // from neighbours (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). The kernel is a box whose radius is just large enough for
-// the mean to have `filter_samples` samples; or a small box repeatedly with strides that double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
+// the mean to have FilterParams.samples samples; or a small box repeatedly with strides that double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
 // HPG 2010).
 //
 // How far the pixels in the box differ by more than their noise says how much of the difference between pixel and box is detail;

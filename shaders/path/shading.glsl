@@ -105,8 +105,7 @@ struct MaterialTextures {
 
 // Value of one of the material's textures at a surface, 1 without a texture.
 vec4 look_up_one(uint use, Surface s, SubmeshRecord submesh, float log_side) {
-    const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR | 1u << USE_DIFFUSE_TRANSMISSION_COLOR;
-    uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
+    uint kind = (SRGB_TEXTURES >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
     return has_use(use) ? sample_use(SHADING_OF(submesh.material).uses[use], submesh, s.primitive, s.uv, kind, log_side) : vec4(1.0);
 }
 

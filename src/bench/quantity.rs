@@ -25,6 +25,11 @@ const fn less<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
     Quantity { name, unit, better: Better::Less }
 }
 
+/// A quantity of which more is better.
+const fn more<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
+    Quantity { name, unit, better: Better::More }
+}
+
 /// A quantity that is not compared with a baseline.
 pub const fn plain<'a>(name: &'a str, unit: &'a str) -> Quantity<'a> {
     Quantity { name, unit, better: Better::Neither }
@@ -51,7 +56,7 @@ pub const PLAIN_RMSE: Quantity = plain("plain RMSE", "");
 pub const PLAIN_CORRECTED: Quantity = plain("corrected plain RMSE", "");
 /// Error before the filter.
 pub const UNFILTERED: Quantity = plain("unfiltered RMSE", "");
-pub const RATE: Quantity = Quantity { name: "rate", unit: "Mrays/s", better: Better::More };
+pub const RATE: Quantity = more("rate", "Mrays/s");
 pub const RAYS: Quantity = plain("rays", "");
 pub const CAMERA_RAYS: Quantity = plain("camera rays", "");
 /// Differences of consecutive frames.

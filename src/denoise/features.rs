@@ -161,6 +161,8 @@ fn colour(material: &Material, point: &AovPixel, options: &PathOptions) -> Vec3 
         _ if options.white_sky.is_some() => Vec3::ONE,
         MaterialKind::Mirror => material.specular_color,
         MaterialKind::Glass => material.specular_color.max(material.transmittance),
-        _ => Vec3::new(point.red, point.green, point.blue),
+        MaterialKind::MetallicRoughness | MaterialKind::Matte | MaterialKind::Copper | MaterialKind::Gold => {
+            Vec3::new(point.red, point.green, point.blue)
+        }
     }
 }

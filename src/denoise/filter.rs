@@ -104,7 +104,11 @@ fn specular_albedo(material: &Material) -> f32 {
         MaterialKind::MetallicRoughness => {
             ((material.ior - 1.0) / (material.ior + 1.0)).powi(2) * material.specular.factor
         }
-        _ => 0.0,
+        MaterialKind::Matte
+        | MaterialKind::Mirror
+        | MaterialKind::Glass
+        | MaterialKind::Copper
+        | MaterialKind::Gold => 0.0,
     }
 }
 

@@ -3,6 +3,7 @@
 //! constants as it needs; a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
+use super::enumerations::Texels;
 use super::path_options::{PATH, PathFeatures};
 
 /// A set, as its GLSL constants are generated from it.
@@ -172,6 +173,29 @@ feature_set! {
     DiffuseTransmission = "USE_DIFFUSE_TRANSMISSION", "diffuse transmission";
     DiffuseTransmissionColor = "USE_DIFFUSE_TRANSMISSION_COLOR", "diffuse transmission colour";
     Retroreflection = "USE_RETROREFLECTION", "retroreflection";
+}
+
+impl TextureFeature {
+    /// The encoding of the texture; shaders know those that are sRGB as `SRGB_TEXTURES`.
+    pub fn texels(self) -> Texels {
+        match self {
+            Self::Emission | Self::SheenColor | Self::SpecularColor | Self::DiffuseTransmissionColor => Texels::Srgb,
+            Self::MetallicRoughness
+            | Self::Normal
+            | Self::Clearcoat
+            | Self::ClearcoatRoughness
+            | Self::ClearcoatNormal
+            | Self::SheenRoughness
+            | Self::Transmission
+            | Self::Specular
+            | Self::Anisotropy
+            | Self::Occlusion
+            | Self::Iridescence
+            | Self::IridescenceThickness
+            | Self::DiffuseTransmission
+            | Self::Retroreflection => Texels::Linear,
+        }
+    }
 }
 
 feature_set! {

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::enumerations::Texels;
+use super::features::TextureFeature;
 use super::layout::{Field, File, Form, Number, Record};
 use super::{constants, enumerations, features, records};
 
@@ -85,6 +87,11 @@ fn feature_set(set: &features::Declaration) -> String {
             writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
     }
     let _ = writeln!(text, "const uint {words}_COUNT = {}u;", set.features.len());
+    if set.name == features::TEXTURE.name {
+        let is_srgb = |f: &&TextureFeature| f.texels() == Texels::Srgb;
+        let srgb = TextureFeature::ALL.iter().filter(is_srgb).fold(0, |mask, &f| mask | 1u32 << f as u32);
+        let _ = writeln!(text, "const uint SRGB_TEXTURES = 0x{srgb:x}u;  // those whose texels are sRGB");
+    }
     for (k, (name, doc)) in set.features.iter().enumerate() {
         if set.is_indexed {
             let _ = writeln!(text, "const uint {name} = {k}u;  // {doc}");

@@ -213,7 +213,10 @@ impl Picture {
                     self.height,
                     colour,
                 ),
-                _ => WebPEncoder::new_lossless(&mut out).write_image(&self.bytes, self.width, self.height, colour),
+                ImageFormat::WebP => {
+                    WebPEncoder::new_lossless(&mut out).write_image(&self.bytes, self.width, self.height, colour)
+                }
+                ImageFormat::Exr | ImageFormat::Png => unreachable!("they were written or refused above"),
             };
             written.map_err(|e| match e {
                 image::ImageError::IoError(e) => e,

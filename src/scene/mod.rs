@@ -149,7 +149,7 @@ pub struct Scene {
     pub variants: Vec<String>,
     /// Decoded images with their samplers.
     pub textures: Vec<Texture>,
-    /// Punctual and spherical lights.
+    /// Lights that no surface emits.
     pub lights: Vec<Light>,
     /// Openings through which the environment is sampled; none: by itself.
     pub portals: Vec<Portal>,

@@ -68,27 +68,6 @@ pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] 
 }
 
 impl TextureFeature {
-    /// The encoding of the texture, as shaders/path/shading.glsl reads it.
-    pub(super) fn texels(self) -> Texels {
-        match self {
-            Self::Emission | Self::SheenColor | Self::SpecularColor | Self::DiffuseTransmissionColor => Texels::Srgb,
-            Self::MetallicRoughness
-            | Self::Normal
-            | Self::Clearcoat
-            | Self::ClearcoatRoughness
-            | Self::ClearcoatNormal
-            | Self::SheenRoughness
-            | Self::Transmission
-            | Self::Specular
-            | Self::Anisotropy
-            | Self::Occlusion
-            | Self::Iridescence
-            | Self::IridescenceThickness
-            | Self::DiffuseTransmission
-            | Self::Retroreflection => Texels::Linear,
-        }
-    }
-
     /// The texture that a material has of this kind.
     fn slot(self, m: &Material) -> Option<TextureSlot> {
         match self {

@@ -230,7 +230,6 @@ fn may_be_smooth(material: &Material) -> bool {
             is_smooth && (material.metallic > 0.0 || material.transmission.factor > 0.0)
         }
         MaterialKind::Matte => false,
-        // conductors
-        _ => material.roughness == 0.0,
+        MaterialKind::Copper | MaterialKind::Gold => material.roughness == 0.0,
     }
 }

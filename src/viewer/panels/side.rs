@@ -159,11 +159,12 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
         }
     });
 
-    // options that have no control of their own
+    // options that have no control of their own; views have one occlusion ray a camera ray
     if let Some(falloff) = ao.ao_falloff {
         ui.weak(format!("Occlusion is halved at this distance: --ao-falloff {}", in_short(falloff)));
     }
-    let rest = ao.editable().into_iter().filter(|s| s.name == "ao_normal").collect();
+    let rest =
+        ao.editable().into_iter().filter(|s| !["ao_radius", "ao_falloff", "ao_rays"].contains(&s.name)).collect();
     editor::edit(ui, rest, &serde_json::json!({ "ao_normal": "geometric" }));
 }
 
