@@ -6,7 +6,7 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::records::scene::TextureUse;
 use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{
-    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, ShadingFeatures, Texels, TextureFeature, TextureFeatures,
+    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, ShadingFeatures, TextureFeature, TextureFeatures,
     TransmissionMode,
 };
 use crate::scene::material::MaterialKind;
