@@ -1,9 +1,11 @@
-//! `skylit info`: what a scene is made of, and how to begin with it.
+//! `skylit info`: what a scene is made of, and how to begin with it. Images are described by
+//! `image_info.rs`.
 
 use clap::{Args, ValueHint};
 use serde_json::json;
 
 use super::args::LoadArgs;
+use super::image_info;
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::output::parse_size;
@@ -31,9 +33,11 @@ const MIDDLE_GREY: f64 = 0.2;
 
 /// `skylit info`.
 #[derive(Clone, Debug, Args)]
-#[command(before_help = "Examples:\n  skylit info scene.glb\n  skylit info scene.glb --no-device --json")]
+#[command(
+    before_help = "Examples:\n  skylit info scene.glb\n  skylit info scene.glb --no-device --json\n  skylit info image.exr"
+)]
 pub struct InfoArgs {
-    /// Scene file (.gltf, .glb, .obj, .brhan) or builtin:NAME
+    /// Scene file (.gltf, .glb, .obj, .brhan), builtin:NAME, or an image (.exr, .hdr, .png, .jpg, .webp)
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
     /// Describe the file alone: no device is opened, and nothing is rendered
@@ -93,6 +97,12 @@ struct OnDevice {
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
+    if image_info::is_image(&args.scene) {
+        if args.size.is_some() {
+            return Err(Error::Usage(format!("--size is for scenes, and {} is an image", args.scene)).into());
+        }
+        return image_info::run(&args.scene, &console);
+    }
     let mut scene = load::load_with(&args.scene, &args.load.options())?;
     args.meaning.apply(&mut scene)?;
     let mut warnings = Warnings::new(console);

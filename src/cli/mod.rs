@@ -8,10 +8,12 @@ mod compare;
 mod compare_ao;
 mod completions;
 mod config;
+mod convert;
 mod diff;
 mod doctor;
 mod export;
 mod help;
+mod image_info;
 mod info;
 mod man;
 mod rays;
@@ -85,12 +87,14 @@ enum Command {
     /// Look at a scene in a window while it is traced
     #[cfg(feature = "viewer")]
     View(Box<view::ViewArgs>),
-    /// Describe a scene: geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device
+    /// Describe a scene (geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device), or an image
     Info(info::InfoArgs),
     /// List the built-in scenes
     Scenes(args::ScenesArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
     Export(args::ExportArgs),
+    /// Write an image in other formats: exposed, tone mapped, or one of its layers
+    Convert(convert::ConvertArgs),
     /// Check whether two images agree
     Diff(args::DiffArgs),
     /// Compare images, or renders made on the spot, with a reference: metrics, difference pictures, an HTML report
@@ -234,6 +238,7 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
+        Command::Convert(args) => return convert::run(&args),
         Command::Diff(args) => return diff::run(&args),
         Command::Stress(args) => return stress::run(&args),
         #[cfg(feature = "compare")]

@@ -24,6 +24,7 @@ pub use settings::FileSettings;
 pub use size::{MAX_PIXELS, check_size, parse_size};
 
 use crate::error::Result;
+use crate::files;
 use crate::memory::Budget;
 
 /// Writes an image as the extension of the path says: `.exr` (everything), or a picture of the
@@ -39,7 +40,8 @@ pub fn save(image: &Image, path: &Path) -> Result<()> {
     }
 }
 
-/// Reads an image that [`save`] or another program wrote. Values of pictures become linear.
+/// Reads an image that [`save`] or another program wrote: one of [`ImageFormat`], or a Radiance file
+/// (.hdr). Values of pictures become linear.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Input`].
@@ -52,6 +54,9 @@ pub fn load(path: &Path) -> Result<Image> {
 /// # Errors
 /// Those of [`load`], and [`Error::OutOfMemory`] for more than the budget has.
 pub fn load_within(path: &Path, budget: &Budget) -> Result<Image> {
+    if files::has_extension(path, "hdr") {
+        return radiance::read(path, budget);
+    }
     match ImageFormat::from_path(path)? {
         ImageFormat::Exr => exr::read_within(path, budget),
         _ => png::read(path, budget),

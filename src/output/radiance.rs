@@ -4,15 +4,22 @@
 //! Values are divided by all `EXPOSURE` and `COLORCORR` entries: so they are as recorded.
 
 use std::io::ErrorKind;
+use std::path::Path;
 
 use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 
 use super::decode::ENDS_EARLY;
+use super::{Channel, Image, check_size};
+use crate::error::Error;
+use crate::files;
 use crate::memory::Budget;
 
 /// Longest header, bytes: commands that made an image may be listed in it.
 const MAX_HEADER: usize = 1 << 16;
+
+/// Greatest side of an image that [`read`] reads, pixels.
+const MAX_SIDE: u32 = 1 << 20;
 
 /// A decoded file: linear values, rows from the top, pixels from the left.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +55,30 @@ struct Resolution {
     reverses_lines: bool,
     /// The first pixel of a scan line is at the right or, of columns, at the bottom.
     reverses_pixels: bool,
+}
+
+/// Reads a file of sides up to `max_side` pixels.
+///
+/// # Errors
+/// [`Error::Input`] naming the file, [`Error::OutOfMemory`].
+pub fn read_file(path: &Path, max_side: u32, budget: &Budget) -> crate::error::Result<RadianceImage> {
+    let bytes = files::read(path)?;
+    budget.read(bytes.len());
+    let image = decode(bytes, max_side, budget);
+    budget.check().map_err(|e| e.in_file(path))?;
+    image.map_err(|e| Error::input(path, e))
+}
+
+/// Reads a file as an image with the channels `R`, `G` and `B`.
+///
+/// # Errors
+/// Those of [`read_file`].
+pub fn read(path: &Path, budget: &Budget) -> crate::error::Result<Image> {
+    let RadianceImage { width, height, rgb } = read_file(path, MAX_SIDE, budget)?;
+    check_size(width, height).map_err(|e| Error::input(path, e.to_string()))?;
+    let plane = |c: usize| rgb.iter().map(|pixel| pixel[c]).collect();
+    let channels = ["R", "G", "B"].into_iter().enumerate().map(|(c, name)| Channel::from_floats(name, plane(c)));
+    Ok(Image { width, height, channels: channels.collect(), metadata: Vec::new() })
 }
 
 /// Decodes a file.

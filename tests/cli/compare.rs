@@ -10,7 +10,7 @@ use skylit::output::{self, Channel, Image, Samples};
 use crate::common::command::{device, fails, json, place, refuses, run, stderr};
 
 /// Writes an image of 8 x 4 pixels whose channels have these values.
-fn write(
+pub(crate) fn write(
     dir: &tempfile::TempDir,
     name: &str,
     channels: &[(&str, &dyn Fn(usize) -> f32)],

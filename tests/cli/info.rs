@@ -1,6 +1,9 @@
 //! `skylit info`: what is in a scene, and how to begin with it.
 
-use crate::common::command::{device, json, place, refuses, run, stderr};
+use serde_json::Value;
+
+use crate::common::command::{device, fails, json, place, refuses, run, stderr};
+use crate::compare::write;
 
 #[test]
 fn files_are_described_without_a_device() {
@@ -68,4 +71,24 @@ fn gpu_warnings_about_a_file() {
     );
     let record = json(&run(&[&render[..], &["--json"]].concat()));
     assert!(record["warnings"].as_array().unwrap().len() >= 4, "{record}");
+}
+
+/// Of an image: each channel with its values and with what is not finite, and the metadata.
+#[test]
+fn images_are_described() {
+    let dir = tempfile::tempdir().unwrap();
+    let values = |k: usize| [0.25, 1.0, f32::NAN, f32::INFINITY][k % 4];
+    let path = write(&dir, "a.exr", &[("Y", &values), ("depth.Z", &|_| 3.0)], &[("skylit.spp", "16")]);
+    let out = run(&["info", &path]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(text.starts_with(&format!("{path}: 8 x 4 pixels, 2 channels\n")), "{text}");
+    assert!(text.contains("0.25 to 1, mean 0.625, 8 NaN, 8 infinite"), "{text}");
+    assert!(text.contains("skylit.spp: 16"), "{text}");
+
+    let record = json(&run(&["info", &path, "--json"]));
+    assert_eq!((&record["size"][0], &record["metadata"]["skylit.spp"]), (&Value::from(8), &Value::from("16")));
+    let depth = record["channels"].as_array().unwrap().iter().find(|c| c["name"] == "depth.Z").unwrap();
+    assert_eq!((depth["min"].as_f64(), depth["mean"].as_f64()), (Some(3.0), Some(3.0)));
+    fails(&run(&["info", &path, "--size", "8x8"]), 64, &["--size is for scenes"]);
+    fails(&run(&["info", "nowhere.exr"]), 3, &["nowhere.exr"]);
 }

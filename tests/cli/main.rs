@@ -19,6 +19,7 @@ mod compare_ao;
 mod config;
 #[cfg(unix)]
 mod confine;
+mod convert;
 mod info;
 #[cfg(unix)]
 mod limits;

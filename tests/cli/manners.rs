@@ -56,6 +56,7 @@ fn three_helps() {
         "rays",
         "stress",
         "export",
+        "convert",
         "diff",
         "scenes",
         "doctor",

@@ -161,11 +161,7 @@ impl Replaced {
 }
 
 fn read_hdr(path: &Path, budget: &Budget) -> Result<Pixels> {
-    let bytes = files::read(path)?;
-    budget.read(bytes.len());
-    let image = radiance::decode(bytes, MAX_SIDE, budget);
-    budget.check().map_err(|e| e.in_file(path))?;
-    let image = image.map_err(|e| Error::input(path, e))?;
+    let image = radiance::read_file(path, MAX_SIDE, budget)?;
     let radiance = image.rgb.into_iter().map(Vec3::from_array).collect();
     Ok(Pixels { width: image.width, height: image.height, radiance, warning: None })
 }
