@@ -14,6 +14,8 @@ const POLE: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct CameraControl {
     camera: Camera,
+    /// The camera at the beginning.
+    opening: Camera,
     /// Distance of the pivot along the view direction, scene units.
     distance: f64,
     /// Diagonal of the scene's bounds, scene units.
@@ -27,7 +29,7 @@ impl CameraControl {
     pub fn new(camera: Camera, bounds: (DVec3, DVec3)) -> Self {
         let (lo, hi) = bounds;
         let scene_size = (hi - lo).length().max(1e-30);
-        let mut control = Self { camera, distance: 1.0, scene_size, speed: 1.0 };
+        let mut control = Self { opening: camera.clone(), camera, distance: 1.0, scene_size, speed: 1.0 };
         control.set_camera(control.camera.clone(), (lo + hi) * 0.5);
         control
     }
@@ -44,12 +46,18 @@ impl CameraControl {
         &self.camera
     }
 
+    /// The camera at the beginning.
+    pub fn opening(&self) -> &Camera {
+        &self.opening
+    }
+
     /// Diagonal of the scene's bounds, scene units.
     pub fn scene_size(&self) -> f64 {
         self.scene_size
     }
 
-    fn eye(&self) -> DVec3 {
+    /// The position of the camera.
+    pub fn eye(&self) -> DVec3 {
         self.camera.camera_to_world.translation
     }
 
@@ -108,6 +116,47 @@ impl CameraControl {
         let unit = visible / height.max(1.0);
         let m = self.camera.camera_to_world.matrix3;
         self.shift((m.y_axis * dy - m.x_axis * dx) * unit);
+    }
+
+    /// Looks along an axis at the pivot, from the same distance.
+    pub fn view(&mut self, view: AxisView) {
+        let (forward, up) = view.directions();
+        let pivot = self.pivot();
+        let right = forward.cross(up);
+        self.camera.camera_to_world =
+            DAffine3::from_mat3_translation(DMat3::from_cols(right, up, -forward), pivot - forward * self.distance);
+        self.become_free();
+    }
+
+    /// Moves to a position, from which it looks at a target, its pivot from then on. Nothing happens
+    /// where they are the same point, or not finite.
+    pub fn place(&mut self, eye: DVec3, target: DVec3) {
+        let offset = target - eye;
+        let distance = offset.length();
+        if !eye.is_finite() || !target.is_finite() || distance < 1e-9 * self.scene_size {
+            return;
+        }
+        // straight up or down there is no horizontal axis to keep
+        let is_vertical = offset.x.hypot(offset.z) < POLE * distance;
+        let up = if is_vertical { self.camera.camera_to_world.matrix3.y_axis } else { DVec3::Y };
+        let up = if up.cross(offset).length() < POLE * distance { DVec3::NEG_Z } else { up };
+        self.camera.camera_to_world = Camera::look_at(eye, target, up, 1.0).camera_to_world;
+        self.distance = distance;
+        self.become_free();
+    }
+
+    /// Zooms as [`CameraControl::zoom`] does, but towards what is under the pointer in the plane of
+    /// the pivot. `at`: the pointer from the middle of the image, right and up, in halves of its
+    /// height.
+    pub fn zoom_at(&mut self, factor: f64, at: [f64; 2]) {
+        let half_height = |c: &Self| match c.camera.projection {
+            Projection::Perspective { fov_y } => c.distance * (0.5 * fov_y).tan(),
+            Projection::Orthographic { half_height } => half_height,
+        };
+        let before = half_height(self);
+        self.zoom(factor);
+        let m = self.camera.camera_to_world.matrix3;
+        self.shift((m.x_axis * at[0] + m.y_axis * at[1]) * (before - half_height(self)));
     }
 
     /// Moves towards the pivot: at 1 not at all, at 0.5 half the way, at 2 back to twice the
@@ -174,6 +223,46 @@ impl CameraControl {
     }
 }
 
+/// A direction along an axis of the world, by the side of the scene that it shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisView {
+    Front,
+    Back,
+    Right,
+    Left,
+    Top,
+    Bottom,
+}
+
+impl AxisView {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Front, Self::Back, Self::Right, Self::Left, Self::Top, Self::Bottom];
+
+    /// Name for people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Front => "Front",
+            Self::Back => "Back",
+            Self::Right => "Right",
+            Self::Left => "Left",
+            Self::Top => "Top",
+            Self::Bottom => "Bottom",
+        }
+    }
+
+    /// Where it looks, and what is up in the image. Models of glTF face +z.
+    fn directions(self) -> (DVec3, DVec3) {
+        match self {
+            Self::Front => (DVec3::NEG_Z, DVec3::Y),
+            Self::Back => (DVec3::Z, DVec3::Y),
+            Self::Right => (DVec3::NEG_X, DVec3::Y),
+            Self::Left => (DVec3::X, DVec3::Y),
+            Self::Top => (DVec3::NEG_Y, DVec3::NEG_Z),
+            Self::Bottom => (DVec3::Y, DVec3::Z),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,6 +305,43 @@ mod tests {
         assert!((c.pivot() - before).length() < 1e-9 && is_rigid(c.camera()));
         c.focus(DVec3::new(1.0, 2.0, 3.0));
         assert!((c.pivot() - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn axes_places_and_pointers() {
+        // along each axis the pivot and its distance stay
+        for view in AxisView::ALL {
+            let mut c = control();
+            c.view(view);
+            assert!(is_rigid(c.camera()), "{view:?}");
+            assert!((c.pivot() - DVec3::Y).length() < 1e-9 && (c.eye() - DVec3::Y).length() - 5.0 < 1e-9, "{view:?}");
+            // and one can go on from there
+            c.orbit(30.0, 20.0);
+            assert!(is_rigid(c.camera()) && c.camera().camera_to_world.matrix3.x_axis.y.abs() < 1e-9, "{view:?}");
+        }
+        let mut c = control();
+        c.view(AxisView::Top);
+        assert!((c.eye() - DVec3::new(0.0, 6.0, 0.0)).length() < 1e-9, "{}", c.eye());
+
+        // typed positions, the one straight above the target, too
+        for (eye, target) in [(DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO), (DVec3::new(1.0, 9.0, 1.0), DVec3::ONE)] {
+            c.place(eye, target);
+            assert!(is_rigid(c.camera()) && (c.pivot() - target).length() < 1e-9 && (c.eye() - eye).length() < 1e-9);
+        }
+        let before = c.camera().clone();
+        c.place(DVec3::ONE, DVec3::ONE);
+        c.place(DVec3::NAN, DVec3::ONE);
+        assert_eq!(*c.camera(), before);
+
+        // what is under the pointer stays there
+        let mut c = control();
+        let under = |c: &CameraControl, [x, y]: [f64; 2]| {
+            let m = c.camera().camera_to_world.matrix3;
+            c.pivot() + (m.x_axis * x + m.y_axis * y) * c.distance * 0.4f64.tan()
+        };
+        let point = under(&c, [0.7, -0.4]);
+        c.zoom_at(0.25, [0.7, -0.4]);
+        assert!((under(&c, [0.7, -0.4]) - point).length() < 1e-9 && (c.distance - 1.25).abs() < 1e-12);
     }
 
     #[test]

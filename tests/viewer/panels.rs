@@ -733,3 +733,54 @@ fn play_and_flicker_have_an_effect() {
     let app = alone.harness.state();
     assert_eq!((app.arrangement, app.shows_second), (Arrangement::Single, true));
 }
+
+/// The opening view is a key away; views along axes, a typed position and the wheel move the camera.
+#[test]
+fn cameras_are_found_again_and_typed() {
+    let mut alone = loaded();
+    let opening = alone.mailbox.peek().camera.unwrap();
+    let forward = |alone: &Alone| -alone.mailbox.peek().camera.unwrap().camera_to_world.matrix3.z_axis;
+    let press = |alone: &mut Alone, modifiers: egui::Modifiers, key: egui::Key| {
+        alone.harness.key_press_modifiers(modifiers, key);
+        alone.harness.run_steps(3);
+    };
+    let shifted = egui::Modifiers::COMMAND | egui::Modifiers::SHIFT;
+    for (modifiers, key, expected) in [
+        (egui::Modifiers::COMMAND, egui::Key::Num7, glam::DVec3::NEG_Y),
+        (egui::Modifiers::COMMAND, egui::Key::Num1, glam::DVec3::NEG_Z),
+        (shifted, egui::Key::Num1, glam::DVec3::Z),
+        (egui::Modifiers::COMMAND, egui::Key::Num3, glam::DVec3::NEG_X),
+    ] {
+        press(&mut alone, modifiers, key);
+        assert!((forward(&alone) - expected).length() < 1e-9, "{key:?}: {}", forward(&alone));
+    }
+    press(&mut alone, egui::Modifiers::NONE, egui::Key::Home);
+    assert_eq!(alone.mailbox.peek().camera.as_ref(), Some(&opening));
+
+    // the wheel comes closer to what is under the pointer: the camera moves to its side, too
+    let right = opening.camera_to_world.matrix3.x_axis;
+    alone.harness.event(egui::Event::PointerMoved(egui::pos2(100.0, 350.0)));
+    let wheel = |y| egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: egui::vec2(0.0, y),
+        modifiers: egui::Modifiers::NONE,
+    };
+    alone.harness.event(wheel(200.0));
+    alone.harness.run_steps(40);
+    let moved = alone.mailbox.peek().camera.unwrap().camera_to_world.translation - opening.camera_to_world.translation;
+    assert!(moved.dot(right) < 0.0 && moved.dot(-opening.camera_to_world.matrix3.z_axis) > 0.0, "{moved}");
+
+    // numbers of the eye, typed
+    press(&mut alone, egui::Modifiers::NONE, egui::Key::Home);
+    alone.harness.get_all_by_label("Camera").last().unwrap().click();
+    alone.harness.run_steps(10);
+    let target = alone.harness.state().control.as_ref().unwrap().pivot();
+    alone.harness.get_by_label("Eye y").click();
+    alone.harness.run_steps(3);
+    alone.harness.event(egui::Event::Text("40".into()));
+    alone.harness.run_steps(3);
+    alone.press(egui::Key::Enter);
+    let typed = alone.harness.state().control.as_ref().unwrap();
+    assert!((typed.eye().y - 40.0).abs() < 1e-9 && (typed.pivot() - target).length() < 1e-6, "{}", typed.eye());
+    assert_eq!(alone.mailbox.peek().camera.unwrap().camera_to_world.translation.y, typed.eye().y);
+}

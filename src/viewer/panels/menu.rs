@@ -4,6 +4,7 @@ use egui::{Button, KeyboardShortcut, Ui};
 
 use crate::scene::builtin;
 use crate::viewer::app::{App, Arrangement};
+use crate::viewer::camera::AxisView;
 use crate::viewer::dialog::{Dialog, RenderedMotion};
 use crate::viewer::request::Task;
 
@@ -189,6 +190,17 @@ fn camera(app: &mut App, ui: &mut Ui) {
     if item(ui, "Frame the whole scene", None, "F") {
         frame_all(app);
     }
+    if item(ui, "Opening view", None, "Home") {
+        open_view(app);
+    }
+    ui.menu_button("Along an axis", |ui| {
+        let keys = ["Ctrl+1", "Ctrl+Shift+1", "Ctrl+3", "Ctrl+Shift+3", "Ctrl+7", "Ctrl+Shift+7"];
+        for (view, key) in AxisView::ALL.into_iter().zip(keys) {
+            if item(ui, view.label(), None, key) {
+                view_along(app, view);
+            }
+        }
+    });
     if item(ui, "Turntable", None, "U") {
         app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
     }
@@ -219,6 +231,19 @@ pub fn keep_camera(app: &mut App) {
         app.bookmarks.push((name.clone(), camera));
         app.report(format!("{name}: in the menu Camera"), false);
     }
+}
+
+/// Returns to the camera at the beginning.
+pub fn open_view(app: &mut App) {
+    let Some(opening) = app.control.as_ref().map(|control| control.opening().clone()) else { return };
+    let followed = app.scene.as_ref().and_then(|scene| scene.cameras.iter().position(|c| *c == opening));
+    app.set_camera(opening, followed);
+}
+
+/// Looks along an axis at what the camera looks at.
+pub fn view_along(app: &mut App, view: AxisView) {
+    app.leave_followed();
+    app.control.iter_mut().for_each(|control| control.view(view));
 }
 
 /// Shows the other image; of two side by side that one alone.

@@ -4,6 +4,7 @@ use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
 
 use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
+use crate::scene::Camera;
 use crate::scene::settings::variant_index;
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
@@ -365,11 +366,7 @@ fn light(app: &mut App, ui: &mut Ui) {
 
 fn camera(app: &mut App, ui: &mut Ui) {
     let Some(shown) = app.shown_camera() else { return };
-    let to_world = shown.camera_to_world;
-    ui.label(format!(
-        "Eye {:.3}, {:.3}, {:.3}",
-        to_world.translation.x, to_world.translation.y, to_world.translation.z
-    ));
+    placement(app, ui, &shown);
     if let crate::scene::Projection::Perspective { fov_y } = shown.projection {
         let mut degrees = fov_y.to_degrees();
         ui.horizontal(|ui| {
@@ -406,6 +403,33 @@ fn camera(app: &mut App, ui: &mut Ui) {
             }
             Err(e) => app.report(e.to_string(), true),
         }
+    }
+}
+
+/// Where the camera is and what it looks at, as numbers to type or to drag.
+fn placement(app: &mut App, ui: &mut Ui, shown: &Camera) {
+    let Some(control) = &app.control else { return };
+    let size = control.scene_size();
+    // an animation may have moved it
+    let moved = shown.camera_to_world.translation - control.eye();
+    let mut points = [control.eye() + moved, control.pivot() + moved];
+    let mut changed = false;
+    for (name, point) in ["Eye", "Target"].into_iter().zip(&mut points) {
+        ui.horizontal(|ui| {
+            ui.label(name);
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(point.as_mut()) {
+                let drag = egui::DragValue::new(value).speed(1e-3 * size).max_decimals(4);
+                let response = ui.add(drag).on_hover_text(format!("{name} {axis}, scene units"));
+                response.widget_info(|| {
+                    egui::WidgetInfo::labeled(egui::WidgetType::DragValue, true, format!("{name} {axis}"))
+                });
+                changed |= response.changed();
+            }
+        });
+    }
+    if changed {
+        app.leave_followed();
+        app.control.iter_mut().for_each(|control| control.place(points[0], points[1]));
     }
 }
 

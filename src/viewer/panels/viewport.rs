@@ -8,6 +8,7 @@ use egui::{
 use super::menu::{self, shortcuts};
 use crate::realtime::Preset;
 use crate::viewer::app::{App, Arrangement};
+use crate::viewer::camera::AxisView;
 use crate::viewer::dialog::Dialog;
 use crate::viewer::layer::Layer;
 use crate::viewer::request::{PickPurpose, Task};
@@ -74,6 +75,20 @@ pub fn keys(app: &mut App, context: &Context) {
     // camera and time
     if pressed(Key::F) {
         menu::frame_all(app);
+    }
+    if pressed(Key::Home) {
+        menu::open_view(app);
+    }
+    for (key, view, opposite) in [
+        (Key::Num1, AxisView::Front, AxisView::Back),
+        (Key::Num3, AxisView::Right, AxisView::Left),
+        (Key::Num7, AxisView::Top, AxisView::Bottom),
+    ] {
+        if context.input_mut(|i| i.consume_key(Modifiers::COMMAND | Modifiers::SHIFT, key)) {
+            menu::view_along(app, opposite);
+        } else if context.input_mut(|i| i.consume_key(Modifiers::COMMAND, key)) {
+            menu::view_along(app, view);
+        }
     }
     if pressed(Key::B) {
         menu::keep_camera(app);
@@ -203,7 +218,11 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
         }
     }
     if scroll != 0.0 || pinch != 1.0 {
-        control.zoom((-0.003 * scroll).exp() / pinch);
+        let middle = response.rect.center();
+        let pointer = response.hover_pos().unwrap_or(middle);
+        let half = 0.5 * f64::from(response.rect.height()).max(1.0);
+        let at = [f64::from(pointer.x - middle.x) / half, f64::from(middle.y - pointer.y) / half];
+        control.zoom_at((-0.003 * scroll).exp() / pinch, at);
     }
     let at = response.interact_pointer_pos().map(|p| {
         let p = (p - response.rect.min) / response.rect.size();
