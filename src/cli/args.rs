@@ -1,5 +1,5 @@
-//! Arguments of loading, and of the commands that have no file of their own for them, checked as far
-//! as possible without a scene or a device.
+//! Arguments of loading, and of the commands that have no file of their own for them, checked as
+//! far as possible without a scene or a device.
 
 use std::path::PathBuf;
 

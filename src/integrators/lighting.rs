@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::error::{Error, Result};
+use crate::scene::environments::BuiltinEnvironment;
 #[cfg(feature = "cli")]
 use crate::scene::light_spec;
 use crate::scene::light_spec::LightSpec;
@@ -23,11 +24,13 @@ settings! {
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
         /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant
-        /// radiance R,G,B, a clear `sky` with its sun, or `none` [default: the scene's]
+        /// radiance R,G,B, a clear `sky` with its sun, `studio`, `softbox`, `overcast`, or `none`
+        /// [default: the scene's]
         ///
         /// `sky:ELEVATION,AZIMUTH,TURBIDITY` says where the sun is, -6 to 90 degrees above the
         /// horizon and in degrees clockwise from -z, and how hazy the air is, 1 to 10; numbers may
         /// be left out from the end [35,215,2.5]. A radiance of 1 is 25,000 candela per square metre.
+        /// The mean radiance of `studio`, `softbox` and `overcast` is 1.
         ///
         /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in
         /// a closed room, and the render prints them as options; `none` leaves it dark.
@@ -57,6 +60,7 @@ enum Wanted {
     None,
     Radiance(DVec3),
     Sky(Result<Sky, String>),
+    Builtin(BuiltinEnvironment),
     File(PathBuf),
 }
 
@@ -66,7 +70,10 @@ impl Wanted {
             ("none", ..) => Self::None,
             (_, Ok(radiance), _) => Self::Radiance(radiance),
             (_, _, Some(sky)) => Self::Sky(sky),
-            _ => Self::File(PathBuf::from(text)),
+            _ => match BuiltinEnvironment::from_name(text) {
+                Some(builtin) => Self::Builtin(builtin),
+                None => Self::File(PathBuf::from(text)),
+            },
         }
     }
 }
@@ -111,6 +118,7 @@ impl LightingSettings {
                 let (map, sun) = Sky { azimuth: sky.azimuth - turn, ..sky }.light(scale);
                 return Ok(Some((Environment::Map(map), sun)));
             }
+            Wanted::Builtin(builtin) => Environment::Map(builtin.map(scale, turn.to_radians())),
             Wanted::File(path) => {
                 let mut map = load::load_environment_with(&path, warn)?;
                 map.factor = Vec3::splat(scale as f32);

@@ -40,8 +40,8 @@ pub fn save(image: &Image, path: &Path) -> Result<()> {
     }
 }
 
-/// Reads an image that [`save`] or another program wrote: one of [`ImageFormat`], or a Radiance file
-/// (.hdr). Values of pictures become linear.
+/// Reads an image that [`save`] or another program wrote: one of [`ImageFormat`], or a Radiance
+/// file (.hdr). Values of pictures become linear.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Input`].

@@ -10,6 +10,7 @@ mod bounds;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
+pub mod environments;
 pub mod export;
 pub mod fingerprint;
 pub mod inventory;

@@ -128,8 +128,8 @@ impl CameraControl {
         self.become_free();
     }
 
-    /// Moves to a position, from which it looks at a target, its pivot from then on. Nothing happens
-    /// where they are the same point, or not finite.
+    /// Moves to a position, from which it looks at a target, its pivot from then on. Nothing
+    /// happens where they are the same point, or not finite.
     pub fn place(&mut self, eye: DVec3, target: DVec3) {
         let offset = target - eye;
         let distance = offset.length();

@@ -784,3 +784,48 @@ fn cameras_are_found_again_and_typed() {
     assert!((typed.eye().y - 40.0).abs() < 1e-9 && (typed.pivot() - target).length() < 1e-6, "{}", typed.eye());
     assert_eq!(alone.mailbox.peek().camera.unwrap().camera_to_world.translation.y, typed.eye().y);
 }
+
+/// Environments are chosen from a list, turned in degrees and brightened in stops.
+#[test]
+fn environments_are_chosen_and_turned() {
+    let mut alone = loaded();
+    alone.harness.get_by_label("Light").click();
+    alone.harness.run_steps(10);
+    alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Environment").click();
+    alone.harness.run_steps(5);
+    alone.click("Soft box");
+    assert_eq!(alone.mailbox.peek().lighting.environment.as_deref(), Some("softbox"));
+
+    // Shift + right drag: half a degree a point, around and around
+    let drag = |alone: &mut Alone, by: f32| {
+        let button = |pressed, x| egui::Event::PointerButton {
+            pos: egui::pos2(x, 350.0),
+            button: egui::PointerButton::Secondary,
+            pressed,
+            modifiers: egui::Modifiers::SHIFT,
+        };
+        alone.harness.input_mut().modifiers = egui::Modifiers::SHIFT;
+        alone.harness.event(egui::Event::PointerMoved(egui::pos2(200.0, 350.0)));
+        alone.harness.event(button(true, 200.0));
+        alone.harness.step();
+        alone.harness.event(egui::Event::PointerMoved(egui::pos2(200.0 + by, 350.0)));
+        alone.harness.step();
+        alone.harness.event(button(false, 200.0 + by));
+        alone.harness.run_steps(2);
+        alone.harness.input_mut().modifiers = egui::Modifiers::NONE;
+    };
+    let camera = alone.mailbox.peek().camera;
+    drag(&mut alone, 40.0);
+    assert_eq!(alone.mailbox.peek().lighting.environment_turn, Some(20.0));
+    drag(&mut alone, 330.0);
+    assert_eq!(alone.mailbox.peek().lighting.environment_turn, Some(-175.0));
+    assert_eq!(alone.mailbox.peek().camera, camera);
+
+    // the scene's own has neither turn nor brightness
+    alone.change(|app| app.lighting.environment_scale = Some(2.0));
+    alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Environment").click();
+    alone.harness.run_steps(5);
+    alone.click("The scene's own");
+    let lighting = alone.mailbox.peek().lighting;
+    assert_eq!((lighting.environment, lighting.environment_turn, lighting.environment_scale), (None, None, None));
+}

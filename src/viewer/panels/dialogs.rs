@@ -17,7 +17,7 @@ use crate::viewer::request::Task;
 pub const CONTROLS: &[(&str, &str)] = &[
     ("Drag", "orbit around the pivot"),
     ("Shift + drag, middle drag", "move sideways and up"),
-    ("Right drag", "look around"),
+    ("Right drag", "look around; with Shift turn the environment"),
     ("Wheel, pinch", "come closer to what is under the pointer, go back"),
     ("W A S D, Q E", "fly forward, left, back, right, down and up (Shift: faster)"),
     ("Arrow keys", "orbit"),

@@ -187,6 +187,8 @@ fn camera(app: &mut App, ui: &mut Ui) {
         ui.label("no scene is loaded");
         return;
     };
+
+    // views of the scene
     if item(ui, "Frame the whole scene", None, "F") {
         frame_all(app);
     }
@@ -204,6 +206,8 @@ fn camera(app: &mut App, ui: &mut Ui) {
     if item(ui, "Turntable", None, "U") {
         app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
     }
+
+    // cameras of the file, and those that were kept
     if !scene.cameras.is_empty() {
         ui.separator();
         for (k, camera) in scene.cameras.iter().enumerate() {

@@ -5,11 +5,12 @@ use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
 use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::Camera;
+use crate::scene::environments::BuiltinEnvironment;
 use crate::scene::settings::variant_index;
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Arrangement, Second};
-use crate::viewer::dialog::RenderedMotion;
+use crate::viewer::dialog::{Dialog, RenderedMotion};
 use crate::viewer::rounding::round_length;
 use crate::viewer::technique::{GROUPS, Technique};
 
@@ -303,32 +304,7 @@ fn light(app: &mut App, ui: &mut Ui) {
         ui.label("Light has an effect on path, direct, lit and whitted.");
     }
 
-    // the environment
-    let heading = ui
-        .label("Environment: a map (.hdr, .exr), sky or R,G,B")
-        .on_hover_text("Enter applies it; empty: the scene's own");
-    let id = ui.make_persistent_id("environment text");
-    let current = app.lighting.environment.clone().unwrap_or_default();
-    // what is typed is of the environment that there was, unless it has been replaced: by a file
-    // that was dropped, say
-    let typed = ui.data_mut(|d| d.get_temp::<(String, String)>(id)).filter(|(of, _)| *of == current);
-    let mut text = typed.map_or_else(|| current.clone(), |(_, text)| text);
-    let edit = ui.text_edit_singleline(&mut text).labelled_by(heading.id);
-    if edit.lost_focus() && text.trim() != current {
-        let trimmed = text.trim();
-        app.lighting.environment = (!trimmed.is_empty()).then(|| trimmed.to_owned());
-        if app.lighting.environment.is_none() {
-            (app.lighting.environment_turn, app.lighting.environment_scale) = (None, None);
-        }
-    }
-    ui.data_mut(|d| d.insert_temp(id, (current, text)));
-    ui.add_enabled_ui(app.lighting.environment.is_some(), |ui| {
-        editor::edit(
-            ui,
-            app.lighting.editable(),
-            &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }),
-        );
-    });
+    environment(app, ui);
     ui.separator();
 
     // a light as text
@@ -362,6 +338,85 @@ fn light(app: &mut App, ui: &mut Ui) {
     if let Some(k) = removed {
         app.lighting.light.remove(k);
     }
+}
+
+/// The environment: one from a list, a file, or what is typed; its turn and brightness.
+fn environment(app: &mut App, ui: &mut Ui) {
+    // one from the list
+    let current = app.lighting.environment.clone().unwrap_or_default();
+    let builtin = BuiltinEnvironment::ALL.map(|e| (e.name(), e.help()));
+    let listed = [("", "The scene's own"), ("none", "None"), ("sky", "A clear sky with its sun"), ("1,1,1", "White")];
+    let listed: Vec<(&str, &str)> = listed.into_iter().chain(builtin).collect();
+    let label = |(name, help): (&str, &str)| match (BuiltinEnvironment::from_name(name), help) {
+        (Some(e), _) => ["Studio", "Soft box", "Overcast"][e as usize].to_owned(),
+        (None, help) => help.to_owned(),
+    };
+    let shown = listed.iter().find(|l| l.0 == current).map_or_else(|| short_name(&current), |l| label(*l));
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        let heading = ui.label("Environment");
+        let list = ComboBox::from_id_salt("environment").selected_text(shown).show_ui(ui, |ui| {
+            for &(name, help) in &listed {
+                if ui.selectable_label(current == name, label((name, help))).on_hover_text(help).clicked() {
+                    chosen = Some(name.to_owned());
+                }
+            }
+        });
+        list.response.labelled_by(heading.id);
+        if ui
+            .button("Browse…")
+            .on_hover_text("A map (.hdr, .exr, .png, .jpg), which can be dropped here, too")
+            .clicked()
+        {
+            app.dialog = Some(Dialog::Open(String::new()));
+        }
+    });
+
+    // what is typed
+    let heading = ui
+        .label("A map's path, sky:ELEVATION,AZIMUTH,TURBIDITY or R,G,B")
+        .on_hover_text("Enter applies it; empty: the scene's own");
+    let id = ui.make_persistent_id("environment text");
+    // what is typed is of the environment that there was, unless it has been replaced: by a file
+    // that was dropped, say
+    let typed = ui.data_mut(|d| d.get_temp::<(String, String)>(id)).filter(|(of, _)| *of == current);
+    let mut text = typed.map_or_else(|| current.clone(), |(_, text)| text);
+    let edit = ui.text_edit_singleline(&mut text).labelled_by(heading.id);
+    if edit.lost_focus() && text.trim() != current {
+        chosen = Some(text.trim().to_owned());
+    }
+    ui.data_mut(|d| d.insert_temp(id, (current, text)));
+    if let Some(chosen) = chosen {
+        app.lighting.environment = Some(chosen).filter(|text| !text.is_empty());
+        if app.lighting.environment.is_none() {
+            (app.lighting.environment_turn, app.lighting.environment_scale) = (None, None);
+        }
+    }
+
+    // its turn and brightness
+    ui.add_enabled_ui(app.lighting.environment.is_some(), |ui| {
+        ui.horizontal(|ui| {
+            let heading = ui.label("Turn").on_hover_text("Counter-clockwise from above; also Shift + right drag");
+            let mut turn = app.lighting.environment_turn.unwrap_or(0.0);
+            let slider = Slider::new(&mut turn, -180.0..=180.0).clamping(SliderClamping::Edits).suffix("°");
+            if ui.add(slider).labelled_by(heading.id).changed() {
+                app.lighting.environment_turn = Some(turn).filter(|turn| *turn != 0.0);
+            }
+        });
+        ui.horizontal(|ui| {
+            let heading = ui.label("Brightness").on_hover_text("Stops: each doubles the environment's radiance");
+            let mut stops = app.lighting.environment_scale.unwrap_or(1.0).max(1e-6).log2();
+            let slider = Slider::new(&mut stops, -8.0..=8.0).clamping(SliderClamping::Edits).suffix(" EV");
+            if ui.add(slider).labelled_by(heading.id).changed() {
+                app.lighting.environment_scale = Some(stops.exp2()).filter(|scale| *scale != 1.0);
+            }
+        });
+    });
+}
+
+/// The last part of a path.
+fn short_name(path: &str) -> String {
+    std::path::Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 fn camera(app: &mut App, ui: &mut Ui) {

@@ -204,7 +204,10 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
     if delta != Vec2::ZERO || scroll != 0.0 || pinch != 1.0 {
         app.leave_followed();
     }
+
+    // drags and the wheel
     let Some(control) = &mut app.control else { return };
+    let mut turned = 0.0;
     if delta != Vec2::ZERO {
         match () {
             () if response.dragged_by(PointerButton::Middle)
@@ -212,6 +215,7 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
             {
                 control.pan(dx, dy, f64::from(response.rect.height()));
             }
+            () if shift && response.dragged_by(PointerButton::Secondary) => turned = 0.5 * dx,
             () if response.dragged_by(PointerButton::Secondary) => control.look(dx, dy),
             () if response.dragged_by(PointerButton::Primary) => control.orbit(-dx, dy),
             () => {}
@@ -224,6 +228,12 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
         let at = [f64::from(pointer.x - middle.x) / half, f64::from(middle.y - pointer.y) / half];
         control.zoom_at((-0.003 * scroll).exp() / pinch, at);
     }
+    if turned != 0.0 && app.lighting.environment.is_some() {
+        let turn = app.lighting.environment_turn.unwrap_or(0.0) + turned;
+        app.lighting.environment_turn = Some((turn + 180.0).rem_euclid(360.0) - 180.0).filter(|turn| *turn != 0.0);
+    }
+
+    // clicks
     let at = response.interact_pointer_pos().map(|p| {
         let p = (p - response.rect.min) / response.rect.size();
         [f64::from(p.x), f64::from(p.y)]
