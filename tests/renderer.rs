@@ -158,6 +158,33 @@ fn gpu_frames_are_antialiased() {
     assert_validation_clean(&device);
 }
 
+/// Frames before the first are those of the sequence: a part of it begins as the whole goes on, and an orbit has no beginning.
+#[test]
+fn gpu_sequences_begin_as_they_go_on() {
+    let device = device();
+    for kind in picked(&device) {
+        let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
+        let mut image = |frames: serde_json::Value| {
+            let mut all = serde_json::json!({ "preset": "balanced", "orbit": 12 });
+            all.as_object_mut().unwrap().extend(frames.as_object().unwrap().clone());
+            let wanted = settings(serde_json::json!({ "image": { "size": [48, 32] }, "frames": all }));
+            renderer.image(&wanted, &mut NoControl).unwrap()
+        };
+        let whole = image(serde_json::json!({ "frames": "0..18", "warm_up": 0 }));
+        assert!(bits(&image(serde_json::json!({ "frames": "17..18", "lead_in": 17 }))) == bits(&whole), "{kind}");
+        // a revolution before and after: the same up to the rounding of an angle
+        let after = image(serde_json::json!({ "frames": "0..13", "warm_up": 0 }));
+        let before = image(serde_json::json!({ "frames": "0..1", "lead_in": 12 }));
+        let cold = image(serde_json::json!({ "frames": "0..1", "warm_up": 0 }));
+        let [near, far] = [&before, &cold].map(|image| {
+            let difference = std::iter::zip(image.f32("Y").unwrap(), after.f32("Y").unwrap());
+            (difference.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (48.0 * 32.0)).sqrt()
+        });
+        assert!(near < 0.1 * far, "{kind}: {near} {far}");
+    }
+    assert_validation_clean(&device);
+}
+
 /// Frames and stills of one renderer, in turn.
 #[test]
 fn gpu_frames_and_stills_take_turns() {

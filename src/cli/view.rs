@@ -86,6 +86,7 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
         camera_path: s.camera_path.clone(),
         orbit: s.orbit,
         warm_up: s.warm_up,
+        lead_in: s.lead_in,
         ..Default::default()
     };
     let image =

@@ -115,6 +115,8 @@ settings! {
             applies(TIMELINE), basic;
         /// Warm-up frames, identical to the first, that are rendered and discarded [default: for a single frame, until histories are full; else 0]
         warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
+        /// Frames of the sequence before the first that are rendered and discarded, so that it begins as it goes on; an orbit has them before frame 0, too
+        lead_in: Option<u32>, option(value_name = "N"), applies(FRAMES);
         /// AO technique [default: the preset's]
         technique: Option<Technique>, option(value_enum), applies(FRAMES);
         /// Primary visibility: rasterized or ray traced [default: auto]

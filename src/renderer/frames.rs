@@ -52,7 +52,9 @@ pub struct Frames<'r> {
     shown: DisplayMode,
     fps: f64,
     range: FrameRange,
+    // frames before the first: of one view, then of the sequence
     warm_up: u32,
+    lead_in: u32,
     done: u32,
     last_camera: Camera,
     report: FramesReport,
@@ -65,7 +67,7 @@ pub struct Frames<'r> {
 pub struct FrameOutput {
     /// Frame number.
     pub number: u32,
-    /// False for frames of the warm-up.
+    /// False for frames that are discarded.
     pub kept: bool,
 }
 
@@ -116,8 +118,12 @@ impl Renderer {
         let settling = || {
             Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings))
         };
-        let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
-        let frames = u64::from(range.end - range.first) + u64::from(warm_up);
+        // frames of an orbit have no beginning, others begin with frame 0
+        let plays = timeline.animation().is_some() && timeline.time.is_none() || timeline.camera_path.is_some();
+        let lead_in = timeline.lead_in.unwrap_or(0).min(if plays { range.first } else { u32::MAX });
+        let warm_up =
+            timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 || lead_in > 0 { 0 } else { settling() });
+        let frames = u64::from(range.end - range.first) + u64::from(warm_up) + u64::from(lead_in);
         let request = TracerRequest {
             needs: frame_needs(&settings, &realtime_settings),
             streams: frame_streams(&settings, &realtime_settings),
@@ -206,6 +212,7 @@ impl Renderer {
             fps,
             range,
             warm_up,
+            lead_in,
             done: 0,
             report,
             metadata,
@@ -214,10 +221,15 @@ impl Renderer {
 }
 
 impl Frames<'_> {
-    /// Number of frames, including those of the warm-up.
+    /// Number of frames, including those that are discarded.
     pub fn count(&self) -> u32 {
         // no more than numbers of frames can be
-        self.warm_up.saturating_add(self.range.end - self.range.first)
+        self.discarded().saturating_add(self.range.end - self.range.first)
+    }
+
+    /// Number of frames before the first that is kept.
+    fn discarded(&self) -> u32 {
+        self.warm_up.saturating_add(self.lead_in)
     }
 
     /// Frame rate, frames per second.
@@ -246,10 +258,11 @@ impl Frames<'_> {
         if self.done >= self.count() {
             return Ok(None);
         }
-        let number = self.range.first + self.done.saturating_sub(self.warm_up);
-        let kept = self.done >= self.warm_up;
+        let number = self.range.first + self.done.saturating_sub(self.discarded());
+        let kept = self.done >= self.discarded();
+        let ahead = self.discarded().saturating_sub(self.done).min(self.lead_in);
         let start = Instant::now();
-        let (camera, update) = self.sequence.frame(f64::from(number), &mut self.tracer)?;
+        let (camera, update) = self.sequence.frame(f64::from(number) - f64::from(ahead), &mut self.tracer)?;
         self.last_camera = camera;
         if self.sequence.has_cut() {
             self.realtime.rewind();

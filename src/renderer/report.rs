@@ -395,7 +395,7 @@ fn warm_up_text(warm_up: usize) -> String {
     let frames = if warm_up == 1 { "frame" } else { "frames" };
     match warm_up {
         0 => String::new(),
-        n => format!(", after {n} warm-up {frames} of the same view (--warm-up 0: none)"),
+        n => format!(", after {n} {frames} that are not kept (--warm-up, --lead-in)"),
     }
 }
 

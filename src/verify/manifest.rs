@@ -481,7 +481,9 @@ fn check(frame: &Frame) -> std::result::Result<(), String> {
         return wrong("--show has no effect here: a frame's ambient visibility is compared");
     }
     let frames = settings.frames.frames.map_or(1, |range| u64::from(range.end - range.first));
-    if frames + u64::from(settings.frames.warm_up.unwrap_or(0)) > MAX_FRAMES {
+    if frames + u64::from(settings.frames.warm_up.unwrap_or(0)) + u64::from(settings.frames.lead_in.unwrap_or(0))
+        > MAX_FRAMES
+    {
         return Err(format!(
             "the last of its frames is compared, and up to {MAX_FRAMES} are rendered for it: use fewer --frames or less --warm-up"
         ));

@@ -45,6 +45,8 @@ const MESSAGE_TIME: Duration = Duration::from_secs(8);
 const STILL_SPP: u32 = 64;
 /// Frames of a turntable that is rendered.
 const TURNTABLE_FRAMES: u32 = 120;
+/// Frames before those of a turntable, in which histories become those of a moving camera.
+const TURNTABLE_LEAD_IN: u32 = 30;
 /// Frames per second of an animation that is rendered, the default of `skylit render`.
 const ANIMATION_FPS: f64 = 30.0;
 /// Offset of the truth's seed from that of the images.
@@ -972,6 +974,8 @@ impl App {
             RenderedMotion::Turntable => {
                 (frames.orbit, frames.frames) =
                     (Some(TURNTABLE_FRAMES), Some(FrameRange { first: 0, end: TURNTABLE_FRAMES }));
+                // the last frame leads to the first
+                frames.lead_in = (!is_still).then_some(TURNTABLE_LEAD_IN);
             }
             RenderedMotion::Animation => {
                 let animation = self.playback.animation.and_then(|k| Some((k, scene.animations.get(k)?.1)));

@@ -155,6 +155,7 @@ impl Technique {
             camera_path: None,
             orbit: None,
             warm_up: None,
+            lead_in: None,
             show: None,
             ..base.frames.clone()
         };

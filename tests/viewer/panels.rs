@@ -798,21 +798,17 @@ fn environments_are_chosen_and_turned() {
 
     // Shift + right drag: half a degree a point, around and around
     let drag = |alone: &mut Alone, by: f32| {
-        let button = |pressed, x| egui::Event::PointerButton {
-            pos: egui::pos2(x, 350.0),
-            button: egui::PointerButton::Secondary,
-            pressed,
-            modifiers: egui::Modifiers::SHIFT,
-        };
-        alone.harness.input_mut().modifiers = egui::Modifiers::SHIFT;
-        alone.harness.event(egui::Event::PointerMoved(egui::pos2(200.0, 350.0)));
-        alone.harness.event(button(true, 200.0));
-        alone.harness.step();
-        alone.harness.event(egui::Event::PointerMoved(egui::pos2(200.0 + by, 350.0)));
-        alone.harness.step();
-        alone.harness.event(button(false, 200.0 + by));
+        let (shift, button) = (egui::Modifiers::SHIFT, egui::PointerButton::Secondary);
+        let at = |x: f32| egui::pos2(x, 350.0);
+        let press = |pressed, pos| egui::Event::PointerButton { pos, button, pressed, modifiers: shift };
+        alone.harness.event(egui::Event::PointerMoved(at(200.0)));
+        alone.harness.run_steps(1);
+        alone.harness.event_modifiers(press(true, at(200.0)), shift);
+        alone.harness.run_steps(1);
+        alone.harness.event_modifiers(egui::Event::PointerMoved(at(200.0 + by)), shift);
+        alone.harness.run_steps(1);
+        alone.harness.event_modifiers(press(false, at(200.0 + by)), shift);
         alone.harness.run_steps(2);
-        alone.harness.input_mut().modifiers = egui::Modifiers::NONE;
     };
     let camera = alone.mailbox.peek().camera;
     drag(&mut alone, 40.0);

@@ -275,8 +275,8 @@ fn frames(app: &mut App, ui: &mut Ui) {
         values["filter"] = values["filter"]["kind"].take();
         values
     });
-    const HIDDEN: [&str; 9] =
-        ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "technique", "show"];
+    const HIDDEN: [&str; 10] =
+        ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "lead_in", "technique", "show"];
     let all = applicable(app.settings.frames.editable(), &crate::integrators::ao::AmbientOcclusion, &HIDDEN);
     editor::edit(ui, all, &effective.unwrap_or_default());
 }
