@@ -1,5 +1,6 @@
 //! Image files: EXR, pictures (PNG, JPEG, WebP, APNG), Radiance HDR, and frame numbers in names.
 
+pub mod animation;
 pub mod apng;
 pub mod decode;
 pub mod exr;
@@ -14,6 +15,7 @@ pub mod radiance;
 pub mod settings;
 mod size;
 pub mod tone_map;
+pub mod video;
 
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{ImageFormat, apng};
+use super::{ImageFormat, animation, video};
 use crate::error::{Error, Result};
 use crate::settings::{AppliesTo, Editable, Value, choices, settings};
 
@@ -142,8 +142,9 @@ impl FileSettings {
     pub fn check(&self, outputs: &[PathBuf], depth_image: Option<&Path>) -> Result<()> {
         let is = |path: &Path, format: ImageFormat| ImageFormat::from_path(path).is_ok_and(|f| f == format);
         let has = |format: ImageFormat| outputs.iter().any(|p| is(p, format));
-        let has_picture =
-            outputs.iter().any(|p| apng::is_apng(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
+        let has_picture = outputs
+            .iter()
+            .any(|p| animation::is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
         let has_png = has(ImageFormat::Png);
         let has_deep_depth = depth_image.is_some_and(|p| is(p, ImageFormat::Png));
         let given = [
@@ -165,6 +166,14 @@ impl FileSettings {
             return Err(Error::Usage(format!(
                 "--background transparent: {} cannot have alpha; write .png or .webp, or give a colour R,G,B",
                 jpeg.display()
+            )));
+        }
+        if let (Some(Background::Transparent), Some(video)) =
+            (self.background, outputs.iter().find(|p| !video::has_alpha(p)))
+        {
+            return Err(Error::Usage(format!(
+                "--background transparent: {} cannot have alpha; write .webm or .apng, or give a colour R,G,B",
+                video.display()
             )));
         }
         match self.exr_compression {

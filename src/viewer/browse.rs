@@ -25,7 +25,9 @@ impl Browsing {
             }
             Dialog::LoadSettings(_) => ("Load settings", &[("Settings", &["json"])]),
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),
-            Dialog::Render(..) => ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng"])]),
+            Dialog::Render(..) => {
+                ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng", "mp4", "webm", "gif"])])
+            }
         };
         let name = dialog.text_mut().clone();
         let saves = matches!(dialog, Dialog::Save(_) | Dialog::SaveSettings(_) | Dialog::Render(..));

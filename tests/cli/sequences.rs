@@ -1,6 +1,6 @@
 //! Frames of light in real time, and stills of a time line, from the command line.
 
-use crate::common::command::{device, json, place, refuses, run};
+use crate::common::command::{count, device, fails, json, place, refuses, run, skylit, stderr};
 
 #[test]
 fn gpu_frames_of_light_have_colours() {
@@ -64,4 +64,61 @@ fn frames_that_cannot_be_are_refused() {
     refused(&["--continue"], "--continue is for stills of several frames");
     refused(&["--spp", "2", "-o", "a.apng"], "stills need numbered files");
     refused(&["--spp", "2", "--resumable"], "--resumable");
+}
+
+/// Videos are encoded by ffmpeg: what it is given, what it says, and that it may be missing.
+#[cfg(unix)]
+#[test]
+fn gpu_videos_are_encoded_by_ffmpeg() {
+    use std::os::unix::fs::PermissionsExt;
+
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let tools = dir.path().join("tools");
+    std::fs::create_dir(&tools).unwrap();
+    let ffmpeg = tools.join("ffmpeg");
+    let is = |script: &str| {
+        std::fs::write(&ffmpeg, format!("#!/bin/sh\n{script}\n")).unwrap();
+        std::fs::set_permissions(&ffmpeg, std::fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    let render = |output: &str, path: &str, options: &[&str]| {
+        let fixed =
+            ["render", "builtin:stairs", "--preset", "fast", "--size", "31x20", "--frames", "0..3", "-o", output];
+        skylit(&[&fixed, options].concat()).env("PATH", path).output().unwrap()
+    };
+    let path = format!("{}:/usr/bin:/bin", tools.display());
+    let [mp4, webm, gif] = ["a.mp4", "a.webm", "a.gif"].map(|n| place(&dir, n));
+
+    // its output is the file: here what it was told, and the bytes that it got
+    is("echo $@; wc -c");
+    for (output, options, expected, bytes) in [
+        (&mp4, &["--fps", "12.5"][..], "gray -video_size 31x20 -framerate 12.5", 3 * 31 * 20),
+        (&webm, &["--background", "transparent"], "ya8 -video_size 31x20 -framerate 30", 3 * 31 * 20 * 2),
+        (&gif, &["--background", "1,0,0"], "rgb24", 3 * 31 * 20 * 3),
+    ] {
+        let out = render(output, &path, options);
+        assert!(out.status.success(), "{}", stderr(&out));
+        let text = std::fs::read_to_string(output).unwrap();
+        assert!(text.contains(expected) && text.trim_end().ends_with(&format!("\n{bytes}")), "{text}");
+    }
+    assert!(std::fs::read_to_string(&webm).unwrap().contains("yuva420p"));
+
+    // what it says is passed on, and what was there before stays
+    let before = std::fs::read(&mp4).unwrap();
+    for script in
+        ["echo \"Unknown encoder 'libx264'\" >&2; exit 1", "cat > /dev/null; echo 'Unknown encoder' >&2; exit 1"]
+    {
+        is(script);
+        fails(&render(&mp4, &path, &[]), 4, &["a.mp4", "ffmpeg: Unknown encoder"]);
+        assert_eq!(std::fs::read(&mp4).unwrap(), before);
+    }
+    std::fs::remove_file(&ffmpeg).unwrap();
+    let missing = place(&dir, "b.mp4");
+    fails(&render(&missing, &tools.to_string_lossy(), &[]), 4, &["b.mp4", "ffmpeg", "not installed"]);
+    fails(&render(&missing, &path, &["--background", "transparent"]), 64, &["b.mp4", "cannot have alpha", ".webm"]);
+    assert!(!std::fs::exists(&missing).unwrap());
+    // two files in all beside the one folder
+    assert_eq!(count(dir.path()), 4);
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::Result;
 use crate::gpu::Buffer;
-use crate::output::apng::{self, Animation, ApngWriter, Delay};
+use crate::output::animation::{self, Animation, AnimationWriter};
 use crate::output::png::Colour;
 use crate::output::settings::Background;
 use crate::output::{FileSettings, Image, ImageFormat, Picture, exr, frames, picture};
@@ -13,7 +13,7 @@ use crate::output::{FileSettings, Image, ImageFormat, Picture, exr, frames, pict
 pub struct FrameFiles {
     images: Vec<PathBuf>,
     pictures: Vec<PathBuf>,
-    animations: Vec<ApngWriter>,
+    animations: Vec<AnimationWriter>,
     colour: Colour,
     settings: FileSettings,
 }
@@ -41,14 +41,13 @@ impl FrameFiles {
         colour: Colour,
         settings: &FileSettings,
     ) -> Result<Self> {
-        let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
+        let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| animation::is_animation(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
         for path in files {
             if ImageFormat::from_path(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }
         }
-        let delay = Delay::of_rate(fps)?;
-        let animation = Animation { size, colour: on_background(colour, settings.background), frames, delay };
-        let start = |p: &PathBuf| ApngWriter::create(p, animation);
+        let animation = Animation { size, colour: on_background(colour, settings.background), frames, fps };
+        let start = |p: &PathBuf| AnimationWriter::create(p, animation);
         let animations = animations.iter().map(start).collect::<Result<_>>()?;
         Ok(Self { images, pictures, animations, colour, settings: settings.clone() })
     }
@@ -91,7 +90,7 @@ impl FrameFiles {
 
     /// Finishes the animations.
     pub fn finish(self) -> Result<()> {
-        self.animations.into_iter().try_for_each(ApngWriter::finish)
+        self.animations.into_iter().try_for_each(AnimationWriter::finish)
     }
 }
 

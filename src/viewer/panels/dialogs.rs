@@ -89,9 +89,11 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         Dialog::Save(_) => ("Save the image", "A file: .png, .jpg or .webp as shown, .exr with all channels", "Save"),
         Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
-        Dialog::Render(..) => {
-            ("Render this view", "A file: .png, .exr, .jpg, .webp, .apng or frames.####.png", "Render")
-        }
+        Dialog::Render(..) => (
+            "Render this view",
+            "A file: .png, .exr, .jpg, .webp, .apng, .mp4, .webm, .gif or frames.####.png",
+            "Render",
+        ),
     };
 
     // its window: a path, and the action as a button
