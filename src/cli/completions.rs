@@ -30,7 +30,7 @@ pub fn run(args: &CompletionsArgs) -> Result<()> {
 }
 
 /// Arguments that name scenes, by their ids.
-const SCENES: [&str; 3] = ["scene", "scenes", "mesh"];
+const SCENES: [&str; 4] = ["scene", "scenes", "files", "mesh"];
 /// Commands that take a scene, for fish.
 const SCENE_COMMANDS: &str = "render view export rays compare bench";
 /// Stands for the values of such an argument where the shell gets a function in place of a list.

@@ -10,7 +10,7 @@ use crate::files;
 use crate::files::plan::FilePlan;
 use crate::memory::Budget;
 use crate::output::settings::Background;
-use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
+use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, layers, picture};
 use crate::renderer::brightness;
 use crate::settings::parse::parse_number;
 use crate::terminal::console::{Failure, Verbosity};
@@ -101,14 +101,22 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     // the image, or a layer of it as one
     let image = output::load_within(&args.input, &Budget::default())?;
     let (image, channels) = match &args.layer {
-        Some(name) => layer(&image, name, &args.input)?,
+        Some(name) => {
+            let found = layers::layer(&image, name);
+            found.map_err(|e| Error::Usage(format!("{}: {e}", args.input.display())))?
+        }
         None => {
             let names = image.channels.iter().map(|c| c.name.clone()).collect();
             (image, names)
         }
     };
-    let range = range_of(args, &image, &channels);
-    let image = range.map_or(image.clone(), |range| stretched(image, range));
+    let range = match args.range {
+        Some(Range::Values(least, greatest)) => Some([least, greatest]),
+        Some(Range::Auto) => Some(layers::extremes(&image)),
+        None if args.layer.is_some() => layers::default_range(&image, &channels),
+        None => None,
+    };
+    let image = range.map_or(image.clone(), |range| layers::stretched(image, range));
 
     // what pictures show of it
     let has_picture = args.outputs.iter().any(|path| ImageFormat::from_path(path).is_ok_and(ImageFormat::is_picture));
@@ -149,120 +157,18 @@ fn check(args: &ConvertArgs) -> Result<()> {
     args.outputs.iter().try_for_each(|path| files::check_writable(path))
 }
 
-/// The layer of a channel: what precedes the last dot of its name, or nothing.
-fn layer_of(channel: &str) -> &str {
-    channel.rsplit_once('.').map_or("", |(layer, _)| layer)
-}
-
-/// A layer or channel as an image of its own: `R`, `G`, `B` of three channels, `Y` of one; with the
-/// alpha of the image. And the names that its channels had.
-fn layer(image: &Image, name: &str, path: &Path) -> Result<(Image, Vec<String>)> {
-    let named = |channel: &&Channel| channel.name == name || layer_of(&channel.name) == name;
-    let found: Vec<&Channel> = image.channels.iter().filter(named).collect();
-    if found.is_empty() {
-        let mut layers: Vec<&str> = image
-            .channels
-            .iter()
-            .map(|c| if layer_of(&c.name).is_empty() { c.name.as_str() } else { layer_of(&c.name) })
-            .collect();
-        layers.dedup();
-        let layers = layers.join(", ");
-        return Err(Error::Usage(format!("{}: has no layer {name:?}: it has {layers}", path.display())));
-    }
-
-    // in the order in which people count them, which is not that of a file
-    let mut found: Vec<&Channel> = found;
-    let place = |c: &Channel| "RXUGYVBZW".find(c.name.rsplit('.').next().unwrap_or_default()).unwrap_or(usize::MAX);
-    found.sort_by_key(|c| place(c));
-    let names: Vec<String> = found.iter().map(|c| c.name.clone()).collect();
-    let new_names: &[&str] = match found.len() {
-        1 => &["Y"],
-        3 => &["R", "G", "B"],
-        n => {
-            return Err(Error::Usage(format!(
-                "{}: layer {name:?} has {n} channels, and an image has 1 or 3: name one of {}",
-                path.display(),
-                names.join(", ")
-            )));
-        }
-    };
-    let mut channels = Vec::with_capacity(4);
-    for (channel, new_name) in found.iter().zip(new_names) {
-        let samples = match &channel.samples {
-            Samples::F32(values) => values.clone(),
-            Samples::U32(numbers) => numbers.iter().map(|n| *n as f32).collect(),
-        };
-        channels.push(Channel::from_floats(*new_name, samples));
-    }
-    channels.extend(image.f32("A").map(|alpha| Channel::from_floats("A", alpha.to_vec())));
-    Ok((Image { channels, metadata: image.metadata.clone(), ..*image }, names))
-}
-
-/// The values that become 0 and 1; `None` where values stay.
-fn range_of(args: &ConvertArgs, image: &Image, channels: &[String]) -> Option<[f32; 2]> {
-    let is_direction = channels.len() == 3 && ["Ng", "Ns", "bent"].contains(&layer_of(&channels[0]));
-    let is_number = args.layer.is_some() && channels.len() == 1 && !["R", "G", "B", "A", "Y"].contains(&&*channels[0]);
-    match args.range {
-        Some(Range::Values(least, greatest)) => Some([least, greatest]),
-        None if is_direction => Some([-1.0, 1.0]),
-        None if !is_number => None,
-        Some(Range::Auto) | None => Some(extremes(image)),
-    }
-}
-
-/// The least and the greatest finite value of the colours, of covered pixels where there are some.
-/// They differ.
-fn extremes(image: &Image) -> [f32; 2] {
-    let alpha = image.f32("A").filter(|alpha| alpha.iter().any(|a| *a > 0.0));
-    let mut found = [f32::INFINITY, f32::NEG_INFINITY];
-    for values in colours(image) {
-        for (k, value) in values.iter().enumerate() {
-            if value.is_finite() && alpha.is_none_or(|alpha| alpha[k] > 0.0) {
-                found = [found[0].min(*value), found[1].max(*value)];
-            }
-        }
-    }
-    match found {
-        [least, greatest] if least < greatest => found,
-        [least, _] if least.is_finite() => [least, least + 1.0],
-        _ => [0.0, 1.0],
-    }
-}
-
-fn colours(image: &Image) -> impl Iterator<Item = &[f32]> {
-    ["R", "G", "B", "Y"].into_iter().filter_map(|name| image.f32(name))
-}
-
-/// The image with its colours stretched so that these values become 0 and 1.
-fn stretched(mut image: Image, [least, greatest]: [f32; 2]) -> Image {
-    for channel in image.channels.iter_mut().filter(|c| ["R", "G", "B", "Y"].contains(&&*c.name)) {
-        if let Samples::F32(values) = &mut channel.samples {
-            values.iter_mut().for_each(|v| *v = (*v - least) / (greatest - least));
-        }
-    }
-    image
-}
-
 /// The exposure of pictures, stops.
 fn exposure_of(args: &ConvertArgs, image: &Image) -> Result<f64> {
     match args.exposure {
         None => Ok(0.0),
         Some(Exposure::Stops(stops)) => Ok(stops),
         Some(Exposure::Auto) => {
-            let planes = colour_planes(image)
+            let planes = layers::colour_planes(image)
                 .ok_or_else(|| Error::Usage(format!("{}: has no colour to expose by", args.input.display())))?;
             let rgb: Vec<f32> = (0..image.pixel_count()).flat_map(|k| planes.map(|plane| plane[k])).collect();
             let opaque = vec![1.0; if image.f32("A").is_none() { image.pixel_count() } else { 0 }];
             Ok(brightness::exposure(&rgb, image.f32("A").unwrap_or(&opaque)).unwrap_or(0.0))
         }
-    }
-}
-
-/// Red, green and blue; three times the same of a grey image.
-fn colour_planes(image: &Image) -> Option<[&[f32]; 3]> {
-    match (image.f32("R"), image.f32("G"), image.f32("B")) {
-        (Some(r), Some(g), Some(b)) => Some([r, g, b]),
-        _ => image.f32("Y").map(|y| [y; 3]),
     }
 }
 
@@ -276,7 +182,7 @@ fn write(args: &ConvertArgs, image: &Image, exposure: f64, path: &Path) -> Resul
     let background: Option<Background> = args.files.background;
     let mut shown = if background.is_some() { picture::unassociated(image) } else { image.clone() };
     if args.tone_map.is_some() || exposure != 0.0 {
-        let planes = colour_planes(&shown).map(|planes| planes.map(<[f32]>::to_vec));
+        let planes = layers::colour_planes(&shown).map(|planes| planes.map(<[f32]>::to_vec));
         let Some(planes) = planes else { return Err(no_colour(args, image)) };
         let names = ["R", "G", "B"].into_iter().zip(planes);
         let colours = names.map(|(name, plane)| Channel::from_floats(name, plane)).collect();
@@ -287,7 +193,7 @@ fn write(args: &ConvertArgs, image: &Image, exposure: f64, path: &Path) -> Resul
         // grey: the same value may be there as three channels, too
         shown.channels.retain(|c| ["Y", "A"].contains(&&*c.name));
     }
-    if colour_planes(&shown).is_none() {
+    if layers::colour_planes(&shown).is_none() {
         return Err(no_colour(args, image));
     }
     let of_others = FileSettings { background, ..FileSettings::default() };

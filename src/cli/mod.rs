@@ -84,7 +84,7 @@ struct Cli {
 enum Command {
     /// Render a scene: ambient occlusion, path tracing, or frames in real time
     Render(Box<render::RenderArgs>),
-    /// Look at a scene in a window while it is traced
+    /// Look at a scene in a window while it is traced, or at images
     #[cfg(feature = "viewer")]
     View(Box<view::ViewArgs>),
     /// Describe a scene (geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device), or an image
@@ -207,7 +207,7 @@ fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
             || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|v| !v.is_empty()));
         let is_view = match arguments.get(1).map(|a| a.to_string_lossy()) {
             None => has_display(),
-            Some(first) => !first.starts_with('-') && view::is_scene(&first),
+            Some(first) => !first.starts_with('-') && view::is_file(&first),
         };
         if is_view {
             arguments.insert(1.min(arguments.len()), "view".into());

@@ -9,6 +9,7 @@ use clap::{Args, ValueHint};
 
 use super::args::LoadArgs;
 use super::config::{self, ConfigArgs};
+use super::image_info;
 use crate::error::{Error, Result};
 use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::RenderSettings;
@@ -20,6 +21,7 @@ use crate::terminal::console::{Failure, Verbosity};
 use crate::tracer::DeviceSettings;
 #[cfg(feature = "probes")]
 use crate::viewer::headless;
+use crate::viewer::images::Images;
 use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, window};
 
 /// Size of the window, points.
@@ -29,15 +31,16 @@ const EXAMPLES: &str = "\
 Examples:
   skylit scene.glb                                       # `view` may be left out
   skylit view scene.glb --integrator path
-  skylit view scene.glb --preset quality --ao-radius 2";
+  skylit view scene.glb --preset quality --ao-radius 2
+  skylit view image.exr reference.exr                    # images, their difference and FLIP";
 
 /// `skylit view`.
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct ViewArgs {
-    /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them) [default: the viewer asks]
-    #[arg(value_hint = ValueHint::FilePath)]
-    pub scene: Option<String>,
+    /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them) [default: the viewer asks]; or images: .exr, .hdr, .png, .jpg, .webp
+    #[arg(value_name = "SCENE|IMAGE", value_hint = ValueHint::FilePath)]
+    pub files: Vec<String>,
     /// Read settings from this file, .json or .toml, which the viewer or a person has written; options given here replace what it says
     #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
@@ -72,9 +75,28 @@ fn parse_frame_rate(text: &str) -> Result<f64, String> {
     if text.trim() == "0" { Ok(0.0) } else { parse_rate(text) }
 }
 
-/// Whether the first argument of the program is a scene and no command.
-pub fn is_scene(argument: &str) -> bool {
-    argument.starts_with("builtin:") || load::is_scene_file(argument)
+/// Whether the first argument of the program is a scene or an image, and no command.
+pub fn is_file(argument: &str) -> bool {
+    argument.starts_with("builtin:") || load::is_scene_file(argument) || image_info::is_image(argument)
+}
+
+/// Looks at images.
+fn run_images(args: &ViewArgs) -> Result<(), Failure> {
+    let is_other = |file: &&String| !image_info::is_image(file);
+    if let Some(scene) = args.files.iter().find(is_other) {
+        let message = format!("{scene}: a scene and images cannot be looked at together");
+        return Err(Error::Usage(message).into());
+    }
+    let settings =
+        RenderSettings { image: ImageSettings { size: None, ..args.settings.image.clone() }, ..args.settings.clone() };
+    if let Some(flag) = settings.flags().first() {
+        return Err(Error::Usage(format!("{flag} is for scenes: leave it out to look at images")).into());
+    }
+    let paths: Vec<PathBuf> = args.files.iter().map(PathBuf::from).collect();
+    let mut images = Images::load(&paths)?;
+    crate::terminal::interrupt::install();
+    let size = args.settings.image.size.unwrap_or(DEFAULT_SIZE);
+    Ok(window::run_images(&mut images, size)?)
 }
 
 /// Refuses settings that have no effect on what is looked at.
@@ -118,13 +140,20 @@ fn is_shown(settings: &RenderSettings, given: &RenderSettings) -> bool {
 /// # Errors
 /// Those of the settings, of the window and of the script.
 pub fn run(args: &ViewArgs) -> Result<(), Failure> {
+    if args.files.iter().any(|file| image_info::is_image(file)) {
+        return run_images(args);
+    }
+    let scene = args.files.first();
+    if let Some(second) = args.files.get(1) {
+        return Err(Error::Usage(format!("{second}: one scene is looked at at a time; images can be several")).into());
+    }
     let given = args.settings.over_file(args.settings_file.as_deref())?;
     given.camera.check()?;
     check_has_effect(&given)?;
 
     // settings of the command line and of files
     let confine = args.load.confine();
-    let files = args.config.files(args.scene.as_deref(), confine)?;
+    let files = args.config.files(scene.map(String::as_str), confine)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
     device_settings.check()?;
@@ -139,7 +168,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let device = crate::gpu::preferred(&device_settings.options()).ok();
     let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
     let options = ViewOptions {
-        scene: args.scene.clone(),
+        scene: scene.cloned(),
         gltf_scene: args.load.gltf_scene.clone(),
         confine,
         vertices: args.load.vertices(),

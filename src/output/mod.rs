@@ -7,6 +7,7 @@ pub mod exr;
 mod format;
 pub mod frames;
 mod image;
+pub mod layers;
 pub mod palette;
 pub mod picture;
 pub mod png;

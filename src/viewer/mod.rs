@@ -3,7 +3,8 @@
 //!
 //! [`app`] is the state of the user interface and `panels` shows it; [`worker`] renders on a thread
 //! of its own what [`request`]s say. Neither knows a window: [`window`] has one; with
-//! the feature `probes`, `headless` runs a `script` without one.
+//! the feature `probes`, `headless` runs a `script` without one. [`images`] are looked at in the same
+//! window, without any of these.
 
 pub mod app;
 pub mod browse;
@@ -12,6 +13,7 @@ pub mod dialog;
 mod file_kind;
 #[cfg(feature = "probes")]
 pub mod headless;
+pub mod images;
 pub mod layer;
 mod options;
 pub mod painter;

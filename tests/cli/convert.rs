@@ -162,3 +162,15 @@ fn what_cannot_be_converted() {
     refuses(&["convert", "nowhere.exr", &png], 3, "nowhere.exr");
     assert!(!fs::exists(&png).unwrap() && !fs::exists(&exr).unwrap());
 }
+
+/// `view` shows images as well, in a window of their own.
+#[cfg(feature = "viewer")]
+#[test]
+fn what_cannot_be_looked_at() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = write(&dir, "a.exr", &[("Y", &|_| 0.5)], &[]);
+    refuses(&["view", &image, "builtin:stairs"], 64, "builtin:stairs");
+    refuses(&["view", "builtin:stairs", "builtin:plane"], 64, "builtin:plane");
+    refuses(&["view", &image, "--ao-radius", "2"], 64, "--ao-radius");
+    refuses(&["view", &image, "nowhere.exr"], 3, "nowhere.exr");
+}

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod images;
 mod panels;
 mod script;
 mod views;

@@ -8,6 +8,8 @@ mod side;
 mod status;
 mod viewport;
 
+pub(super) use menu::shortcuts;
+
 use super::app::App;
 
 /// Runs a frame of the user interface: takes over what has happened, shows everything, requests

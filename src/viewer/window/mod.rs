@@ -1,4 +1,4 @@
-//! The viewer in a window.
+//! The viewer, and images, in a window.
 
 mod cpu;
 mod vulkan;
@@ -23,6 +23,63 @@ use crate::error::{Error, Result};
 const INTERRUPT_INTERVAL: Duration = Duration::from_millis(300);
 /// Smallest size of the window, points.
 const MIN_SIZE: [f64; 2] = [320.0, 240.0];
+
+/// What a window shows: its user interface, and images beneath it.
+pub trait WindowApp {
+    /// Runs a frame of the user interface.
+    fn frame(&mut self, context: &egui::Context);
+
+    /// The images of the last frame.
+    fn layers(&self) -> &[Layer];
+
+    /// Title of the window.
+    fn title(&self) -> String;
+
+    /// Returns true once the user has closed it.
+    fn closes(&self) -> bool;
+
+    /// Opens files that were dropped on the window.
+    fn open_dropped(&mut self, files: &[egui::DroppedFile]);
+
+    /// Tells the user of an error.
+    fn report(&mut self, message: String);
+}
+
+impl WindowApp for App {
+    fn frame(&mut self, context: &egui::Context) {
+        panels::show_frame(self, context);
+    }
+
+    fn layers(&self) -> &[Layer] {
+        App::layers(self)
+    }
+
+    fn title(&self) -> String {
+        self.scene.as_ref().map_or("skylit".to_owned(), |s| format!("{} - skylit", s.source))
+    }
+
+    fn closes(&self) -> bool {
+        self.closes
+    }
+
+    fn open_dropped(&mut self, files: &[egui::DroppedFile]) {
+        App::open_dropped(self, files);
+    }
+
+    fn report(&mut self, message: String) {
+        App::report(self, message, true);
+    }
+}
+
+/// How a window is opened and painted.
+#[derive(Clone, Debug)]
+struct WindowOptions {
+    /// Points.
+    size: [u32; 2],
+    painter: Painter,
+    /// Name of the device, and whether it has the validation layer; for [`Painter::Vulkan`].
+    device: (Option<String>, bool),
+}
 
 /// Brings frames to the screen.
 trait Presenter {
@@ -66,21 +123,26 @@ impl From<egui_winit::accesskit_winit::Event> for Wake {
     }
 }
 
-/// Opens the window and returns when it is closed.
+fn no_display(error: &dyn std::fmt::Display) -> Error {
+    let text = crate::terminal::console::one_line(&error.to_string());
+    // winit's errors begin with the line of its source that they come from
+    let reason = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text.as_str(), |r| r.1);
+    let reason = reason.trim_end_matches(['.', ')']);
+    Error::Device(format!(
+        "no window can be opened here ({reason}): set DISPLAY or WAYLAND_DISPLAY, or use `skylit render`"
+    ))
+}
+
+fn event_loop() -> Result<EventLoop<Wake>> {
+    EventLoop::<Wake>::with_user_event().build().map_err(|e| no_display(&e))
+}
+
+/// Opens a window on a scene and returns when it is closed.
 ///
 /// # Errors
 /// [`Error::Device`] without a display; those of starting the thread that renders.
 pub fn run(options: &ViewOptions) -> Result<()> {
-    let no_display = |e: &dyn std::fmt::Display| {
-        let text = crate::terminal::console::one_line(&e.to_string());
-        // winit's errors begin with the line of its source that they come from
-        let reason = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text.as_str(), |r| r.1);
-        let reason = reason.trim_end_matches(['.', ')']);
-        Error::Device(format!(
-            "no window can be opened here ({reason}): set DISPLAY or WAYLAND_DISPLAY, or use `skylit render`"
-        ))
-    };
-    let event_loop = EventLoop::<Wake>::with_user_event().build().map_err(|e| no_display(&e))?;
+    let event_loop = event_loop()?;
     let proxy = event_loop.create_proxy();
     let mailbox = Arc::new(Mailbox::default());
     let (sender, events) = std::sync::mpsc::channel();
@@ -90,6 +152,27 @@ pub fn run(options: &ViewOptions) -> Result<()> {
         Arc::new(move || drop(proxy.send_event(Wake::At(Instant::now()))))
     };
     let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.load())?;
+    let device = (options.device_name.clone(), options.device.validation);
+    let window_options = WindowOptions { size: options.size, painter: options.painter, device };
+    let mut app = App::new(options, mailbox, events);
+    let outcome = show(event_loop, &mut app, window_options);
+    app.quit();
+    // a panic of it was an event, which the window has shown
+    let _ = thread.join();
+    outcome
+}
+
+/// Opens a window on images and returns when it is closed. `size`: in points.
+///
+/// # Errors
+/// [`Error::Device`] without a display.
+pub fn run_images(images: &mut impl WindowApp, size: [u32; 2]) -> Result<()> {
+    show(event_loop()?, images, WindowOptions { size, painter: Painter::Cpu, device: (None, false) })
+}
+
+/// Opens a window and returns when it is closed.
+fn show<A: WindowApp>(event_loop: EventLoop<Wake>, app: &mut A, options: WindowOptions) -> Result<()> {
+    let proxy = event_loop.create_proxy();
     let context = egui::Context::default();
     {
         let proxy = proxy.clone();
@@ -99,22 +182,17 @@ pub fn run(options: &ViewOptions) -> Result<()> {
             }
         });
     }
-    let app = App::new(options, mailbox, events);
-    let options = options.clone();
     let mut viewer =
         Viewer { app, context, proxy, options, open: None, redraw: None, failed: None, presenter_failures: 0 };
     let outcome = event_loop.run_app(&mut viewer).map_err(|e| no_display(&e));
-    viewer.app.quit();
-    // a panic of it was an event, which the window has shown
-    let _ = thread.join();
     viewer.failed.map_or(outcome, Err)
 }
 
-struct Viewer {
-    app: App,
+struct Viewer<'a, A> {
+    app: &'a mut A,
     context: egui::Context,
     proxy: EventLoopProxy<Wake>,
-    options: ViewOptions,
+    options: WindowOptions,
     open: Option<OpenWindow>,
     /// When the window is to be drawn next.
     redraw: Option<Instant>,
@@ -130,7 +208,7 @@ struct OpenWindow {
     window: Arc<Window>,
 }
 
-impl Viewer {
+impl<A: WindowApp> Viewer<'_, A> {
     fn open(&self, event_loop: &ActiveEventLoop) -> Result<OpenWindow> {
         let attributes = Window::default_attributes()
             .with_title("skylit")
@@ -155,8 +233,8 @@ impl Viewer {
         let presenter: Box<dyn Presenter> = match self.options.painter {
             Painter::Cpu => Box::new(cpu::CpuPresenter::new(window.clone())?),
             Painter::Vulkan => {
-                let device = self.options.device_name.clone();
-                Box::new(vulkan::VulkanPresenter::new(window.clone(), device, self.options.device.validation)?)
+                let (device, validation) = self.options.device.clone();
+                Box::new(vulkan::VulkanPresenter::new(window.clone(), device, validation)?)
             }
         };
         window.set_visible(true);
@@ -176,20 +254,20 @@ impl Viewer {
         // the interface runs first: it decides what is shown
         let input = open.input.take_egui_input(&open.window);
         self.app.open_dropped(&input.dropped_files);
-        let app = &mut self.app;
-        let mut output = self.context.run(input, |context| panels::show_frame(app, context));
+        let app = &mut *self.app;
+        let mut output = self.context.run(input, |context| app.frame(context));
         open.input.handle_platform_output(&open.window, std::mem::take(&mut output.platform_output));
         open.painted.take(&mut output);
         if let Some(viewport) = output.viewport_output.get(&egui::ViewportId::ROOT) {
             self.redraw = Instant::now().checked_add(viewport.repaint_delay);
         }
 
-        let title = self.app.scene.as_ref().map_or("skylit".to_owned(), |s| format!("{} - skylit", s.source));
+        let title = self.app.title();
         if title != open.title {
             open.window.set_title(&title);
             open.title = title;
         }
-        if self.app.closes {
+        if self.app.closes() {
             event_loop.exit();
             return;
         }
@@ -204,7 +282,7 @@ impl Viewer {
             Ok(()) => {
                 self.presenter_failures = 0;
                 let messages = open.presenter.check();
-                messages.into_iter().for_each(|m| self.app.report(format!("validation: {m}"), true));
+                messages.into_iter().for_each(|m| self.app.report(format!("validation: {m}")));
             }
             Err(e) if self.presenter_failures > 10 => self.fail(event_loop, e),
             Err(_) => {
@@ -219,7 +297,7 @@ impl Viewer {
     }
 }
 
-impl ApplicationHandler<Wake> for Viewer {
+impl<A: WindowApp> ApplicationHandler<Wake> for Viewer<'_, A> {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if self.open.is_none() {
             match self.open(event_loop) {
