@@ -23,9 +23,8 @@ settings! {
     /// Light besides the scene's.
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
-        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a constant
-        /// radiance R,G,B, a clear `sky` with its sun, `studio`, `softbox`, `overcast`, or `none`
-        /// [default: the scene's]
+        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a radiance
+        /// R,G,B, a clear `sky`, `studio`, `softbox`, `overcast`, or `none` [default: the scene's]
         ///
         /// `sky:ELEVATION,AZIMUTH,TURBIDITY` says where the sun is, -6 to 90 degrees above the
         /// horizon and in degrees clockwise from -z, and how hazy the air is, 1 to 10; numbers may

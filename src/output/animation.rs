@@ -2,17 +2,13 @@
 
 use std::path::Path;
 
+use super::AnimationFormat;
 use super::apng::{self, ApngWriter, Delay};
 use super::png::Colour;
-use super::video::{self, VideoWriter};
+use super::video::VideoWriter;
 use crate::error::Result;
 
-/// Does the name end in `.apng`, `.mp4`, `.webm` or `.gif`?
-pub fn is_animation(path: &Path) -> bool {
-    apng::is_apng(path) || video::is_video(path)
-}
-
-/// What an animation has in common in all its frames.
+/// An animation: what its frames have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Animation {
     /// Width and height, pixels.
@@ -39,7 +35,7 @@ impl AnimationWriter {
     /// Those of [`ApngWriter::create`] and [`VideoWriter::create`].
     pub fn create(path: &Path, animation: Animation) -> Result<Self> {
         let Animation { size, colour, frames, fps } = animation;
-        if video::is_video(path) {
+        if AnimationFormat::from_path(path).is_some_and(|format| format != AnimationFormat::Apng) {
             return Ok(Self::Video(Box::new(VideoWriter::create(path, size, colour, fps)?)));
         }
         let animation = apng::Animation { size, colour, frames, delay: Delay::of_rate(fps)? };

@@ -1,8 +1,35 @@
-//! Kinds of image files.
+//! Kinds of image files, and of animations.
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::files;
+
+/// A file that holds all frames of a sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnimationFormat {
+    /// Animated PNG.
+    Apng,
+    /// H.264, without alpha.
+    Mp4,
+    /// VP9.
+    WebM,
+    /// A palette of 256 colours.
+    Gif,
+}
+
+impl AnimationFormat {
+    /// The kind that the extension of `path` names, if it is one.
+    pub fn from_path(path: &Path) -> Option<Self> {
+        let kinds = [("apng", Self::Apng), ("mp4", Self::Mp4), ("webm", Self::WebM), ("gif", Self::Gif)];
+        kinds.into_iter().find(|(extension, _)| files::has_extension(path, extension)).map(|(_, kind)| kind)
+    }
+}
+
+/// Returns true if the name is that of a file that holds all frames of a sequence.
+pub fn is_animation(path: &Path) -> bool {
+    AnimationFormat::from_path(path).is_some()
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {

@@ -10,7 +10,7 @@ fn layer_of(channel: &str) -> &str {
     channel.rsplit_once('.').map_or("", |(layer, _)| layer)
 }
 
-/// What can be shown of an image besides its colours: names of layers, and of channels without one.
+/// Lists the layers of an image besides its colours, and channels without a layer.
 pub fn names(image: &Image) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     for channel in &image.channels {

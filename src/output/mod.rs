@@ -21,7 +21,7 @@ pub mod video;
 use std::path::Path;
 
 pub use self::image::{Channel, Image, Samples};
-pub use format::ImageFormat;
+pub use format::{AnimationFormat, ImageFormat, is_animation};
 pub use picture::Picture;
 pub use settings::FileSettings;
 pub use size::{MAX_PIXELS, check_size, parse_size};

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{ImageFormat, animation, video};
+use super::{AnimationFormat, ImageFormat, is_animation};
 use crate::error::{Error, Result};
 use crate::settings::{AppliesTo, Editable, Value, choices, settings};
 
@@ -142,11 +142,12 @@ impl FileSettings {
     pub fn check(&self, outputs: &[PathBuf], depth_image: Option<&Path>) -> Result<()> {
         let is = |path: &Path, format: ImageFormat| ImageFormat::from_path(path).is_ok_and(|f| f == format);
         let has = |format: ImageFormat| outputs.iter().any(|p| is(p, format));
-        let has_picture = outputs
-            .iter()
-            .any(|p| animation::is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
+        let has_picture =
+            outputs.iter().any(|p| is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
         let has_png = has(ImageFormat::Png);
         let has_deep_depth = depth_image.is_some_and(|p| is(p, ImageFormat::Png));
+
+        // each setting has a file that has it
         let given = [
             ("--png-bits", self.png_bits.is_some(), has_png || has_deep_depth, ".png"),
             ("--png-encoding", self.png_encoding.is_some(), has_png, ".png"),
@@ -160,6 +161,8 @@ impl FileSettings {
                 "{option} has no effect without a {kind} output: leave it out, or add such an output"
             )));
         }
+
+        // what a format cannot have
         if let (Some(Background::Transparent), Some(jpeg)) =
             (self.background, outputs.iter().find(|p| is(p, ImageFormat::Jpeg)))
         {
@@ -169,7 +172,7 @@ impl FileSettings {
             )));
         }
         if let (Some(Background::Transparent), Some(video)) =
-            (self.background, outputs.iter().find(|p| !video::has_alpha(p)))
+            (self.background, outputs.iter().find(|p| AnimationFormat::from_path(p) == Some(AnimationFormat::Mp4)))
         {
             return Err(Error::Usage(format!(
                 "--background transparent: {} cannot have alpha; write .webm or .apng, or give a colour R,G,B",

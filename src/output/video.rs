@@ -4,10 +4,10 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::check_size;
 use super::png::Colour;
+use super::{AnimationFormat, check_size};
 use crate::error::{Error, Result};
-use crate::files::{self, AtomicFile};
+use crate::files::AtomicFile;
 
 /// Where ffmpeg writes: its standard output, which is a file, so that it can go back in it.
 #[cfg(unix)]
@@ -15,23 +15,10 @@ const OUTPUT: &str = "file:/dev/fd/1";
 #[cfg(not(unix))]
 const OUTPUT: &str = "pipe:1";
 
-/// A kind of video.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Mp4,
-    WebM,
-    Gif,
-}
-
-impl Kind {
-    fn from_path(path: &Path) -> Option<Self> {
-        let kinds = [("mp4", Self::Mp4), ("webm", Self::WebM), ("gif", Self::Gif)];
-        kinds.into_iter().find(|(extension, _)| files::has_extension(path, extension)).map(|(_, kind)| kind)
-    }
-
+impl AnimationFormat {
     /// How ffmpeg encodes it. Players want sides of an even number of pixels: an odd one gets a
     /// black row or column.
-    fn arguments(self, has_alpha: bool) -> Vec<&'static str> {
+    fn ffmpeg_arguments(self, has_alpha: bool) -> Vec<&'static str> {
         const EVEN: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv";
         const COLOURS: [&str; 6] = ["-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-colorspace", "bt709"];
         let format = if has_alpha { "yuva420p" } else { "yuv420p" };
@@ -39,22 +26,13 @@ impl Kind {
             Self::Mp4 if cfg!(unix) => &["-c:v", "libx264", "-crf", "16", "-movflags", "+faststart", "-f", "mp4"],
             Self::Mp4 => &["-c:v", "libx264", "-crf", "16", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4"],
             Self::WebM => &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-row-mt", "1", "-f", "webm"],
+            Self::Apng => &["-f", "apng", "-plays", "0"],
             Self::Gif => {
                 return vec!["-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse", "-loop", "0", "-f", "gif"];
             }
         };
         [&["-vf", EVEN, "-pix_fmt", format], &COLOURS[..], encoded].concat()
     }
-}
-
-/// Does the name end in `.mp4`, `.webm` or `.gif`?
-pub fn is_video(path: &Path) -> bool {
-    Kind::from_path(path).is_some()
-}
-
-/// Can videos of this name be transparent?
-pub fn has_alpha(path: &Path) -> bool {
-    Kind::from_path(path).is_none_or(|kind| kind != Kind::Mp4)
 }
 
 /// A video being written. [`VideoWriter::finish`] makes the file; dropped before, none is left.
@@ -73,7 +51,7 @@ impl VideoWriter {
     /// [`Error::Output`] where there is no ffmpeg, or the file cannot be written.
     pub fn create(path: &Path, [width, height]: [u32; 2], colour: Colour, fps: f64) -> Result<Self> {
         check_size(width, height)?;
-        let kind = Kind::from_path(path).unwrap_or(Kind::Mp4);
+        let format = AnimationFormat::from_path(path).unwrap_or(AnimationFormat::Mp4);
         let mut file = AtomicFile::create(path)?;
         let pixels = match colour {
             Colour::Grey => "gray",
@@ -85,7 +63,7 @@ impl VideoWriter {
         let encoder = Command::new("ffmpeg")
             .args(["-nostdin", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", pixels])
             .args(["-video_size", &size, "-framerate", &rate, "-i", "pipe:0"])
-            .args(kind.arguments(colour.has_alpha()))
+            .args(format.ffmpeg_arguments(colour.has_alpha()))
             .args(["-y", OUTPUT])
             .stdin(Stdio::piped())
             .stdout(file.handle()?)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::integrators::ao::settings::AoSettings;
-use crate::output::{animation, frames};
+use crate::output::{frames, is_animation};
 use crate::raster::Primary;
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FilterKind, Preset, Resolution, Settings, Technique};
@@ -212,7 +212,7 @@ impl FrameSettings {
         let range = self.range();
         for path in outputs {
             let numbered = frames::is_pattern(path)?;
-            if animation::is_animation(path) {
+            if is_animation(path) {
                 if numbered {
                     return Err(Error::Usage(format!(
                         "{}: an animation holds all frames; leave out the #",

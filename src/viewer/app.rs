@@ -962,6 +962,8 @@ impl App {
                     .into(),
             ));
         }
+
+        // samples of a still, and the moment
         if is_still {
             settings.image.spp = Some(self.settings.image.spp.unwrap_or(STILL_SPP));
         }
@@ -969,6 +971,8 @@ impl App {
         if let (Some(k), false) = (self.playback.animation, motion == RenderedMotion::Animation) {
             (frames.animate, frames.time) = (Some(k.to_string()), Some(self.playback.time));
         }
+
+        // what moves
         match motion {
             RenderedMotion::Nothing => {}
             RenderedMotion::Turntable => {

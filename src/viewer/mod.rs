@@ -3,8 +3,8 @@
 //!
 //! [`app`] is the state of the user interface and `panels` shows it; [`worker`] renders on a thread
 //! of its own what [`request`]s say. Neither knows a window: [`window`] has one; with
-//! the feature `probes`, `headless` runs a `script` without one. [`images`] are looked at in the same
-//! window, without any of these.
+//! the feature `probes`, `headless` runs a `script` without one. [`images`] are looked at in the
+//! same window, without any of these.
 
 pub mod app;
 pub mod browse;

@@ -138,4 +138,7 @@ fn pixels_are_found_and_enlarged() {
     assert!((harness.state().middle.x - middle.x - 10.0).abs() < 0.5, "{middle} {}", harness.state().middle);
     press(&mut harness, egui::Key::F);
     assert_eq!(harness.state().zoom, 0.0);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Q);
+    harness.run_steps(1);
+    assert!(harness.state().closes());
 }

@@ -12,7 +12,7 @@ use crate::files::plan::FilePlan;
 use crate::integrators;
 use crate::output::frames::FramePattern;
 use crate::output::settings::ExrCompression;
-use crate::output::{FileSettings, ImageFormat, animation};
+use crate::output::{FileSettings, ImageFormat, is_animation};
 use crate::realtime::display::DisplayMode;
 use crate::renderer::RenderSettings;
 use crate::renderer::defaults::{self, DefaultsReport};
@@ -41,7 +41,7 @@ pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Image to write: .exr (all channels, metadata), or a picture: .png, .jpg, .webp (lossless); of frames in real time also .apng, or .mp4, .webm and .gif by ffmpeg; may be given more than once
+    /// Image to write: .exr (all channels, metadata), .png, .jpg, .webp (lossless); frames in real time also .apng, .mp4, .webm, .gif; may be given more than once
     #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Write the image so far on Ctrl-C, too (the exit code is still 130)
@@ -93,9 +93,7 @@ impl RenderArgs {
 
     /// Returns true if a picture or an animation is written.
     pub fn writes_picture(&self) -> bool {
-        self.output
-            .iter()
-            .any(|p| animation::is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture))
+        self.output.iter().any(|p| is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture))
     }
 
     /// Returns true if channels of frames in real time are needed, not only what they display.
@@ -133,7 +131,7 @@ impl RenderArgs {
             return wrong("--show is for pictures (.png, .jpg, .webp, .apng): for an .exr use --aov".into());
         }
         if self.settings.is_still_sequence() {
-            if let Some(path) = self.output.iter().find(|p| animation::is_animation(p)) {
+            if let Some(path) = self.output.iter().find(|p| is_animation(p)) {
                 let path = path.display();
                 return wrong(format!(
                     "{path}: an animation is of frames in real time; stills need numbered files, like out.####.png"
@@ -147,7 +145,7 @@ impl RenderArgs {
 
         // options of stills alone
         let frames = self.settings.realtime_setting();
-        let images = self.output.iter().filter(|p| frames.is_none() || !animation::is_animation(p));
+        let images = self.output.iter().filter(|p| frames.is_none() || !is_animation(p));
         let formats = images.map(|p| ImageFormat::from_path(p)).collect::<Result<Vec<_>>>()?;
         let of_stills = [
             (self.keep_partial, "--keep-partial", "leave it out"),

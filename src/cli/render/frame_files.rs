@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use crate::error::Result;
 use crate::gpu::Buffer;
-use crate::output::animation::{self, Animation, AnimationWriter};
+use crate::output::animation::{Animation, AnimationWriter};
 use crate::output::png::Colour;
 use crate::output::settings::Background;
-use crate::output::{FileSettings, Image, ImageFormat, Picture, exr, frames, picture};
+use crate::output::{FileSettings, Image, ImageFormat, Picture, exr, frames, is_animation, picture};
 
 /// The files that frames are written to.
 pub struct FrameFiles {
@@ -41,7 +41,7 @@ impl FrameFiles {
         colour: Colour,
         settings: &FileSettings,
     ) -> Result<Self> {
-        let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| animation::is_animation(p));
+        let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| is_animation(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
         for path in files {
             if ImageFormat::from_path(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }

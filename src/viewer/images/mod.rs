@@ -18,7 +18,7 @@ use crate::memory::Budget;
 use crate::output::{self, Image};
 use crate::renderer::interactive::ViewPicture;
 
-/// What is shown of the images.
+/// Content of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// One of them.
@@ -45,7 +45,7 @@ pub struct Loaded {
     pub image: Image,
 }
 
-/// What a picture is made of: as long as it is the same, the picture is.
+/// The source of a picture: as long as it is the same, the picture is.
 #[derive(Clone, Debug, PartialEq)]
 struct Made {
     shown: usize,
@@ -71,7 +71,7 @@ pub struct Images {
     pub middle: Vec2,
     /// Pixel under the pointer.
     pub pixel: Option<[u32; 2]>,
-    /// What went wrong last.
+    /// The last error.
     pub message: Option<String>,
     pub closes: bool,
     display: Option<(Made, Arc<pixels::Display>)>,

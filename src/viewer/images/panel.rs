@@ -13,7 +13,10 @@ const ZOOM_STEP: f32 = 2.0;
 /// Shows everything, in the order in which it claims space.
 pub(super) fn show(app: &mut Images, context: &Context) {
     keys(app, context);
-    egui::TopBottomPanel::top("images").show(context, |ui| ui.horizontal_wrapped(|ui| controls(app, ui)));
+    egui::TopBottomPanel::top("images").show(context, |ui| {
+        ui.horizontal(|ui| choice(app, ui));
+        ui.horizontal(|ui| look(app, ui));
+    });
     egui::TopBottomPanel::bottom("values").show(context, |ui| values(app, ui));
     CentralPanel::default().frame(egui::Frame::NONE).show(context, |ui| viewport(app, ui));
 }
@@ -62,8 +65,8 @@ fn keys(app: &mut Images, context: &Context) {
     }
 }
 
-fn controls(app: &mut Images, ui: &mut Ui) {
-    // the image, and the one that it is compared with
+/// The image, the one that it is compared with, and what of them is shown.
+fn choice(app: &mut Images, ui: &mut Ui) {
     let name = |app: &Images, k: usize| {
         let path = &app.images[k].path;
         format!("{} {}", k + 1, path.file_name().unwrap_or_default().to_string_lossy())
@@ -92,9 +95,10 @@ fn controls(app: &mut Images, ui: &mut Ui) {
             ui.selectable_value(&mut app.content, content, label);
         }
     }
-    ui.separator();
+}
 
-    // a layer, and how its values become colours
+/// A layer, how its values become colours, and how large they are.
+fn look(app: &mut Images, ui: &mut Ui) {
     let names: Vec<String> = output::layers::names(app.image()).into_iter().map(str::to_owned).collect();
     let has_colours = output::layers::colour_planes(app.image()).is_some();
     let heading = ui.label("Layer");

@@ -30,7 +30,7 @@ pub(super) struct Display {
 }
 
 impl Display {
-    /// Of an image or a layer of it, exposed and tone mapped.
+    /// Colours of an image or a layer of it, exposed and tone mapped.
     ///
     /// # Errors
     /// Why there is nothing to show, in words.
@@ -57,7 +57,7 @@ impl Display {
         })
     }
 
-    /// Of a comparison: its difference times two to the power of `exposure`, or FLIP.
+    /// Colours of a comparison: its difference times two to the power of `exposure`, or FLIP.
     pub fn from_comparison(comparison: &Comparison, size: [u32; 2], content: Content, exposure: f32) -> Self {
         let maps = &comparison.maps;
         let channels = comparison.channels.len().max(1);
@@ -72,7 +72,7 @@ impl Display {
         Self { size, rgb }
     }
 
-    /// What a window shows of it: pixels as squares where they are enlarged, means where they are
+    /// The part of it that a window shows: pixels as squares where they are enlarged, means where they are
     /// reduced.
     pub fn view(&self, place: &Place) -> ViewPicture {
         let [width, height] = place.size.map(|n| n as usize);

@@ -24,7 +24,7 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(300);
 /// Smallest size of the window, points.
 const MIN_SIZE: [f64; 2] = [320.0, 240.0];
 
-/// What a window shows: its user interface, and images beneath it.
+/// A program in a window: its user interface, and images beneath it.
 pub trait WindowApp {
     /// Runs a frame of the user interface.
     fn frame(&mut self, context: &egui::Context);
