@@ -64,6 +64,13 @@ pub fn load(source: &str) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let mut scene = load_any(source, options)?;
+    scene.report.options = options.flags();
+    Ok(scene)
+}
+
+/// Loads a file or a built-in scene.
+fn load_any(source: &str, options: &LoadOptions) -> Result<Scene> {
     let is_gltf = matches!(extension(Path::new(source)).as_str(), "gltf" | "glb");
     if let Some(scene) = options.scene.filter(|_| !is_gltf) {
         return Err(Error::Usage(format!("--gltf-scene {scene}: {source} is no glTF file, which may have several")));

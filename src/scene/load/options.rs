@@ -1,5 +1,6 @@
 //! Options of loading, and the count of loads in progress.
 
+use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -33,6 +34,17 @@ pub enum NormalSource {
     Smooth(f64),
 }
 
+impl fmt::Display for NormalSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => f.write_str("file"),
+            Self::Flat => f.write_str("flat"),
+            Self::Smooth(degrees) if *degrees == 180.0 => f.write_str("smooth"),
+            Self::Smooth(degrees) => write!(f, "{degrees}"),
+        }
+    }
+}
+
 impl FromStr for NormalSource {
     type Err = String;
 
@@ -59,6 +71,16 @@ pub struct VertexOptions {
     pub uv: Option<Projection>,
 }
 
+impl VertexOptions {
+    /// The options as words of the command line: `--normals`, `flat`, ...; none of the defaults.
+    pub fn flags(&self) -> Vec<String> {
+        let normals = Some(self.normals).filter(|n| *n != NormalSource::File);
+        let normals = normals.map(|normals| ["--normals".to_owned(), normals.to_string()]);
+        let uv = self.uv.map(|projection| ["--uv".to_owned(), projection.to_string()]);
+        normals.into_iter().chain(uv).flatten().collect()
+    }
+}
+
 /// Options of loading a scene.
 #[derive(Clone, Copy)]
 pub struct LoadOptions<'a> {
@@ -75,6 +97,15 @@ pub struct LoadOptions<'a> {
     pub scene: Option<&'a str>,
     /// Normals and texture coordinates, also of built-in scenes.
     pub vertices: VertexOptions,
+}
+
+impl LoadOptions<'_> {
+    /// The options that decide what is loaded, as words of the command line: `--gltf-scene`,
+    /// `--normals`, `--uv`; none of the defaults.
+    pub fn flags(&self) -> Vec<String> {
+        let scene = self.scene.map(|scene| ["--gltf-scene".to_owned(), scene.to_owned()]);
+        scene.into_iter().flatten().chain(self.vertices.flags()).collect()
+    }
 }
 
 /// Images decoded so far.
