@@ -5,6 +5,8 @@ mod brhan;
 mod camera_path;
 mod compact;
 pub mod confine;
+#[cfg(feature = "dds")]
+mod dds;
 mod environment;
 mod find;
 mod finish;
@@ -21,6 +23,8 @@ mod ranges;
 mod smoothing;
 mod split;
 mod tangents;
+#[cfg(any(feature = "dds", feature = "ktx2"))]
+mod texels;
 mod text;
 mod vertices;
 mod warnings;

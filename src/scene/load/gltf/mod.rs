@@ -77,6 +77,7 @@ const KNOWN: &[(&str, bool)] = &[
     ("KHR_texture_basisu", cfg!(feature = "ktx2")),
     ("KHR_texture_transform", true),
     ("KHR_xmp_json_ld", true),
+    ("MSFT_texture_dds", cfg!(feature = "dds")),
 ];
 
 /// Reads a `.gltf` or `.glb` file.

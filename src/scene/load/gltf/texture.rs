@@ -110,7 +110,11 @@ pub(super) fn resolve(
 }
 
 /// Extensions by which a texture has an image of another format than PNG and JPEG.
-const SOURCES: &[(&str, bool)] = &[("KHR_texture_basisu", cfg!(feature = "ktx2")), ("EXT_texture_webp", true)];
+const SOURCES: &[(&str, bool)] = &[
+    ("KHR_texture_basisu", cfg!(feature = "ktx2")),
+    ("MSFT_texture_dds", cfg!(feature = "dds")),
+    ("EXT_texture_webp", true),
+];
 
 /// Index of a texture's image. One of an extension comes first, as these want it: what stands
 /// beside it is for programs without them.
