@@ -12,7 +12,7 @@ use crate::renderer::report::milliseconds;
 use crate::renderer::settings::options_text;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::inventory::Inventory;
-use crate::scene::{Scene, SceneSettings, load};
+use crate::scene::{Scene, SceneSettings};
 use crate::settings::Length;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
@@ -93,7 +93,7 @@ struct OnDevice {
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
-    let mut scene = load::load_with(&args.scene, &args.load.options())?;
+    let mut scene = args.load.load(&args.scene, &console)?;
     args.meaning.apply(&mut scene)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));

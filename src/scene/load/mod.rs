@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
-pub use options::{ImagesDecoded, LoadOptions, NormalSource, Projection, VertexOptions, is_in_progress};
+pub use options::{LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, VertexOptions, is_in_progress};
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;

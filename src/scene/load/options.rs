@@ -87,8 +87,8 @@ pub struct LoadOptions<'a> {
     /// Whether images are decoded. Without them materials have no textures, and
     /// [`crate::scene::LoadReport::skipped_images`] says what was left out.
     pub textures: bool,
-    /// Called after each image that was decoded, from several threads.
-    pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
+    /// Called after each part that was decoded, from several threads.
+    pub progress: &'a (dyn Fn(LoadProgress) + Sync),
     /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are
     /// not opened.
     pub confine: Confine<'a>,
@@ -108,12 +108,23 @@ impl LoadOptions<'_> {
     }
 }
 
-/// Images decoded so far.
+/// What is decoded while a scene is loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ImagesDecoded {
-    /// Number of images that are decoded.
+pub enum LoadPart {
+    /// Compressed geometry: views and primitives.
+    Geometry,
+    /// Images.
+    Images,
+}
+
+/// How much of a scene is decoded so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoadProgress {
+    /// What is counted.
+    pub part: LoadPart,
+    /// Number of those that are decoded.
     pub done: usize,
-    /// Number of all images; `None` for an .obj, of which it is not known before.
+    /// Number of all; `None` for images of an .obj, which is not known before.
     pub of: Option<usize>,
 }
 

@@ -93,7 +93,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     scene.report.files = container::files(&document, path, loading.options.confine.folder())?;
     let buffers = container::buffers(&document, chunks.bin, path, loading);
     let stored = Reader { document: &document, buffers: &buffers, decoded: &Decoded::default(), budget };
-    let decoded = compressed::decode(&stored);
+    let decoded = compressed::decode(&stored, loading.options.progress);
     let reader = Reader { decoded: &decoded, ..stored };
     let input = |e| Error::input(path, e);
     let chosen = node::choose_scene(&document, loading.options.scene).map_err(input)?;

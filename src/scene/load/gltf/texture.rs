@@ -13,7 +13,7 @@ use super::accessor::Reader;
 use super::glossiness::RoughnessTexture;
 use super::values::{text, valid};
 use super::{container, uri};
-use crate::scene::load::options::{ImagesDecoded, Loading};
+use crate::scene::load::options::{LoadPart, LoadProgress, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
@@ -59,7 +59,8 @@ pub(super) fn resolve(
     let (count, done) = (wanted.len(), AtomicUsize::new(0));
     let decode = |i: usize| {
         let decoded = image(reader, path, loading, i);
-        (options.progress)(ImagesDecoded { done: 1 + done.fetch_add(1, Ordering::Relaxed), of: Some(count) });
+        let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+        (options.progress)(LoadProgress { part: LoadPart::Images, done, of: Some(count) });
         (i, decoded)
     };
     let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
