@@ -81,6 +81,7 @@ impl Sphere {
 
 /// Geometry of a mesh.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nearly all geometry is triangles, and vertices are what takes memory")]
 pub enum Geometry {
     /// Indexed triangles.
     Triangles(TriangleMesh),
