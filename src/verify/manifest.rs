@@ -558,7 +558,7 @@ mod tests {
         assert!(frames.len() == 1 && frames[0].tolerance.z_test.is_some(), "{frames:?}");
     }
 
-    /// Normals and texture coordinates are keys of a frame, and options of the command that renders it.
+    /// Normals and texture coordinates are keys of a frame, and options of its command.
     #[test]
     fn normals_and_texture_coordinates_are_chosen() {
         let dir = tempfile::tempdir().unwrap();

@@ -206,7 +206,7 @@ pub struct App {
     pub gltf_scene: Option<String>,
     /// Normals and texture coordinates of all scenes that are opened.
     pub vertices: VertexOptions,
-    /// Those of the last scene that was opened.
+    /// Normals and texture coordinates of the last scene that was opened.
     opened_vertices: VertexOptions,
     /// Text to be put on the clipboard.
     pub copied: Option<String>,

@@ -1,4 +1,5 @@
-//! KTX2 images: Basis Universal (ETC1S, UASTC and their kin), ASTC, BC1 to BC7 and plain numbers, as they are or packed by Zstandard.
+//! KTX2 images: Basis Universal (ETC1S, UASTC and their kin), ASTC, BC1 to BC7 and plain numbers,
+//! as they are or packed by Zstandard.
 //!
 //! Only the largest level is read: levels are computed where a scene needs them.
 //!

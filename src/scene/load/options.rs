@@ -108,7 +108,7 @@ impl LoadOptions<'_> {
     }
 }
 
-/// What is decoded while a scene is loaded.
+/// A kind of parts that are decoded while a scene is loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoadPart {
     /// Compressed geometry: views and primitives.
@@ -120,7 +120,7 @@ pub enum LoadPart {
 /// How much of a scene is decoded so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadProgress {
-    /// What is counted.
+    /// Kind of the parts that are counted.
     pub part: LoadPart,
     /// Number of those that are decoded.
     pub done: usize,
