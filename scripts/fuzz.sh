@@ -21,7 +21,7 @@ while [ $# -gt 0 ]; do
     *) break ;;
   esac
 done
-all=(gltf glb draco meshopt ktx2 obj mtl brhan hdr exr png camera_path manifest film hierarchy mesh_bin settings)
+all=(gltf glb draco meshopt ktx2 dds obj mtl brhan hdr exr png camera_path manifest film hierarchy mesh_bin settings)
 targets=("${@:-${all[@]}}")
 
 host=$(rustc -vV | sed -n 's/^host: //p')

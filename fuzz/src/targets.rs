@@ -20,6 +20,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("draco", draco),
     ("meshopt", meshopt),
     ("ktx2", ktx2),
+    ("dds", dds),
     ("obj", obj),
     ("mtl", mtl),
     ("brhan", brhan),
@@ -128,15 +129,26 @@ pub fn meshopt(folder: &Path, data: &[u8]) -> bool {
 
 /// A KTX2 image, as a texture that is left out if it is broken.
 pub fn ktx2(folder: &Path, data: &[u8]) -> bool {
-    write(folder, "t.ktx2", data);
+    image(folder, "KHR_texture_basisu", data)
+}
+
+/// A DDS image, likewise.
+pub fn dds(folder: &Path, data: &[u8]) -> bool {
+    image(folder, "MSFT_texture_dds", data)
+}
+
+/// An image of a texture that has it by an extension.
+fn image(folder: &Path, extension: &str, data: &[u8]) -> bool {
+    write(folder, "t.image", data);
     let document = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-        "extensionsUsed": ["KHR_texture_basisu"], "extensionsRequired": ["KHR_texture_basisu"],
+        "extensionsUsed": ["EXTENSION"], "extensionsRequired": ["EXTENSION"],
         "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
-        "materials": [{ "emissiveTexture": { "index": 0 } }], "images": [{ "uri": "t.ktx2" }],
-        "textures": [{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }],
+        "materials": [{ "emissiveTexture": { "index": 0 } }], "images": [{ "uri": "t.image" }],
+        "textures": [{ "extensions": { "EXTENSION": { "source": 0 } } }],
         "accessors": [{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3 }],
         "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
         "buffers": [{ "uri": "TRIANGLE", "byteLength": 36 }] }"#
+        .replace("EXTENSION", extension)
         .replace("TRIANGLE", TRIANGLE);
     match load_file(&write(folder, "a.gltf", document.as_bytes())) {
         Ok(scene) => scene.textures.len() == 1,

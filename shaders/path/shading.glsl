@@ -17,9 +17,9 @@ uvec4 shading_head(uint material) { return LOAD_QUAD(SceneRoot(push.scene).shadi
 
 // Twice the area of a triangle on a texture of one by one, before the use's own transform.
 float texcoord_area(SubmeshRecord submesh, uvec3 corners, uint set) {
-    uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
+    uvec2 base = texcoord_set(submesh, set);
     if (is_null(base)) return 0.0;
-    corners -= submesh.first_vertex;
+    corners = texcoord_indices(submesh, corners, set);
     vec2 a = load_vec2(base, corners.x);
     vec2 edge1 = load_vec2(base, corners.y) - a, edge2 = load_vec2(base, corners.z) - a;
     return abs(edge1.x * edge2.y - edge1.y * edge2.x);
@@ -31,7 +31,7 @@ vec4 sample_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv, 
     if (use.texture == INVALID) return vec4(1.0);
     if (is_null(submesh.indices)) {
         // without levels: the footprint is one of triangles
-        if (!HAS_SPHERES || submesh.sphere_textures == 0u) return vec4(1.0);
+        if (!HAS_SPHERES || submesh.texcoord_sets == 0u) return vec4(1.0);
         return sample_texture(use.texture, transform_texcoord(use.transform, use.offset, uv), kind != TEXELS_LINEAR);
     }
     uvec3 corners = triangle_indices(submesh, primitive);
@@ -73,7 +73,7 @@ vec3 sphere_emission_texture(uint instance, vec3 normal) {
     SceneRoot root = SceneRoot(push.scene);
     uvec2 records = Pairs(root.scene_instances).v[instance];
     SubmeshRecord submesh = load_submesh_record(root.submeshes, records.y);
-    if (submesh.sphere_textures == 0u) return vec3(1.0);
+    if (submesh.texcoord_sets == 0u) return vec3(1.0);
     if (!SINGLE_LEVEL) normal = normalize(transform_vector(InstanceRecords(root.instances).v[records.x].world_to_group, normal));
     return sample_use(SHADING_OF(submesh.material).uses[USE_EMISSION], submesh, submesh.first_primitive, sphere_texcoord(normal), TEXELS_SRGB, SHARP).rgb;
 }
@@ -193,7 +193,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     vec4 tangent = vec4(0.0);
     bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
     if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(submesh.tangents)) tangent = tangent_at(s, submesh, submesh.tangents);
-    if (HAS_SPHERES && submesh.sphere_textures != 0u) tangent = sphere_tangent(s);
+    if (HAS_SPHERES && submesh.texcoord_sets != 0u) tangent = sphere_tangent(s);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(textures.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);

@@ -7,10 +7,18 @@
 // Vertex indices of a triangle in its group. `primitive` is an index in the group.
 uvec3 triangle_indices(SubmeshRecord submesh, uint primitive) { return load_triple(submesh.indices, primitive); }
 
-vec2 texcoord_at(SubmeshRecord submesh, uvec3 corners, vec2 uv, uint set) {
-    uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
-    if (is_null(base)) return vec2(0.0);
+// Where a set of texture coordinates is, and in it those of vertices of the group. Sets from 1 on lie side by side, vertex by vertex.
+uvec2 texcoord_set(SubmeshRecord submesh, uint set) { return set == 0u ? submesh.texcoords0 : submesh.texcoords1; }
+uvec3 texcoord_indices(SubmeshRecord submesh, uvec3 corners, uint set) {
     corners -= submesh.first_vertex;
+    if (!HAS_MANY_TEXCOORDS || set == 0u) return corners;
+    return corners * submesh.texcoord_sets + (set - 1u);
+}
+
+vec2 texcoord_at(SubmeshRecord submesh, uvec3 corners, vec2 uv, uint set) {
+    uvec2 base = texcoord_set(submesh, set);
+    if (is_null(base)) return vec2(0.0);
+    corners = texcoord_indices(submesh, corners, set);
     return load_vec2(base, corners.x) * (1.0 - uv.x - uv.y) + load_vec2(base, corners.y) * uv.x + load_vec2(base, corners.z) * uv.y;
 }
 
@@ -28,7 +36,7 @@ vec2 transform_texcoord(vec4 m, vec2 offset, vec2 st) { return vec2(m.x * st.x +
 vec4 base_color(SubmeshRecord submesh, MaterialRecord material, uint primitive, vec2 uv) {
     vec4 color = material.base_color;
     if (is_null(submesh.indices)) {
-        if (HAS_SPHERES && submesh.sphere_textures != 0u && material.base_color_texture != INVALID) {
+        if (HAS_SPHERES && submesh.texcoord_sets != 0u && material.base_color_texture != INVALID) {
             vec2 st = transform_texcoord(material.texcoord_transform, material.texcoord_offset, uv);
             color.rgb *= sample_texture(material.base_color_texture, st, true).rgb;
         }

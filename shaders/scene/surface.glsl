@@ -123,7 +123,7 @@ Surface surface_at(Ray ray, Hit hit) {
         vec3 at = transform_point(instance.world_to_group, ray.origin) + hit.t * transform_vector(instance.world_to_group, ray.direction);
         normal = normalize(at - sphere.xyz);
         p = sphere.xyz + sphere.w * normal;
-        if (submesh.sphere_textures != 0u) s.uv = sphere_texcoord(normal);
+        if (submesh.texcoord_sets != 0u) s.uv = sphere_texcoord(normal);
         // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
         error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
     } else {

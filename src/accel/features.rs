@@ -115,6 +115,8 @@ pub struct SceneFeatures {
     pub stochastic_alpha: bool,
     /// Some textures have more than 8 bits a channel.
     pub deep_texels: bool,
+    /// Some mesh has more than two sets of texture coordinates.
+    pub many_texcoords: bool,
     /// The scene has analytic spheres.
     pub spheres: bool,
     /// A single TLAS instance with an identity transform: the top level is skipped.
@@ -130,6 +132,11 @@ impl SceneFeatures {
             alpha: flat.has_alpha(),
             stochastic_alpha: flat.has_stochastic_alpha(),
             deep_texels: flat.scene.textures.iter().any(|t| !matches!(t.texels, TexelData::Unorm8(_))),
+            many_texcoords: flat
+                .scene
+                .meshes
+                .iter()
+                .any(|m| matches!(&m.geometry, Geometry::Triangles(t) if !t.more_texcoords.is_empty())),
             spheres: flat.has_spheres(),
             single_level: flat.is_single_level(),
             shading: None,

@@ -5,11 +5,14 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
+use crate::error::Result;
 use crate::integrators::rays::Mode;
-use crate::scene::SceneSettings;
-use crate::scene::load::{Confine, LoadOptions, NormalSource, Projection, VertexOptions};
+use crate::renderer::Renderer;
+use crate::scene::load::{Confine, LoadOptions, NormalSource, Projection, VertexOptions, load_with};
+use crate::scene::{Scene, SceneSettings};
 use crate::settings::parse::parse_limit;
-use crate::terminal::console::Verbosity;
+use crate::terminal::console::{Console, Verbosity};
+use crate::terminal::loading::with_progress;
 use crate::tracer::DeviceSettings;
 
 /// Which files of a scene are read, and which of a file's scenes.
@@ -36,6 +39,18 @@ impl LoadArgs {
     pub fn options(&self) -> LoadOptions<'_> {
         let (scene, confine, vertices) = (self.gltf_scene.as_deref(), self.confine(), self.vertices());
         LoadOptions { scene, confine, vertices, ..LoadOptions::default() }
+    }
+
+    /// Loads a scene, and shows the progress.
+    pub fn load(&self, source: &str, console: &Console) -> Result<Scene> {
+        with_progress(source, console, |progress| load_with(source, &LoadOptions { progress, ..self.options() }))
+    }
+
+    /// Opens a renderer of a scene, and shows the progress of loading.
+    pub fn open(&self, source: &str, device: &DeviceSettings, console: &Console) -> Result<Renderer> {
+        with_progress(source, console, |progress| {
+            Renderer::open_with(source, &LoadOptions { progress, ..self.options() }, device)
+        })
     }
 
     /// The normals and texture coordinates that the options ask for.

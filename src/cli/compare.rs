@@ -23,8 +23,8 @@ use crate::measure::mask::MaskOptions;
 use crate::memory::Budget;
 use crate::output::{self, Image};
 use crate::realtime::frame_settings::FrameSettings;
+use crate::renderer::RenderSettings;
 use crate::renderer::settings::{CameraSettings, ImageSettings};
-use crate::renderer::{RenderSettings, Renderer};
 use crate::report;
 use crate::scene::SceneSettings;
 use crate::settings::parse::Parsed;
@@ -341,7 +341,7 @@ fn entries(
     let mut renderer = match (&args.scene, settings.is_empty()) {
         (Some(scene), false) => {
             interrupt::install();
-            let renderer = Renderer::open_with(scene, &args.load.options(), &args.device)?;
+            let renderer = args.load.open(scene, &args.device, &console)?;
             plan.check_scene(&renderer.scene().report.files)?;
             Some(renderer)
         }

@@ -14,7 +14,6 @@ use crate::film::Control;
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::lighting::LightingSettings;
 use crate::output::{self, ImageFormat, parse_size};
-use crate::renderer::Renderer;
 use crate::renderer::settings::CameraSettings;
 use crate::report;
 use crate::scene::SceneSettings;
@@ -90,7 +89,7 @@ pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
     let plan = args.check()?;
     interrupt::install();
     let console = args.verbosity.console();
-    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
     let mut control = CompareControl {

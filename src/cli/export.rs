@@ -6,8 +6,8 @@ use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
+use crate::scene::Scene;
 use crate::scene::export::{self, ExportStats};
-use crate::scene::{Scene, load};
 use crate::terminal::warnings::Warnings;
 
 /// Checks the files that are written beside a `.gltf`: they replace no file of the scene and,
@@ -49,7 +49,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     plan.writes("the output", output);
     plan.check()?;
     files::check_writable(output)?;
-    let mut scene = load::load_with(&args.scene, &args.load.options())?;
+    let mut scene = args.load.load(&args.scene, &console)?;
     args.meaning.apply(&mut scene)?;
     check_companions(args, plan, &scene, output)?;
     let mut warnings = Warnings::new(console);

@@ -14,7 +14,7 @@ use crate::renderer::report::milliseconds;
 use crate::renderer::settings::options_text;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::inventory::Inventory;
-use crate::scene::{Scene, SceneSettings, load};
+use crate::scene::{Scene, SceneSettings};
 use crate::settings::Length;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
@@ -103,7 +103,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
         return image_info::run(&args.scene, &console);
     }
-    let mut scene = load::load_with(&args.scene, &args.load.options())?;
+    let mut scene = args.load.load(&args.scene, &console)?;
     args.meaning.apply(&mut scene)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));

@@ -13,7 +13,7 @@ use crate::gpu::Device;
 use crate::integrators::rays;
 use crate::measure::stats::median;
 use crate::ray::{Ray, translate};
-use crate::scene::{Scene, export, load};
+use crate::scene::{Scene, export};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
 use crate::terminal::warnings::Warnings;
@@ -106,7 +106,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
 fn read_mesh(args: &RaysArgs) -> Result<Scene> {
     let path = Path::new(&args.mesh);
     let soup = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
-    if soup { export::read_mesh_bin(path) } else { load::load_with(&args.mesh, &args.load.options()) }
+    if soup { export::read_mesh_bin(path) } else { args.load.load(&args.mesh, &args.verbosity.console()) }
 }
 
 /// Reads RAYS.bin.

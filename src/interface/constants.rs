@@ -49,6 +49,8 @@ constants! {
     HAS_COVERAGE: bool = true;
     #[doc = "Some textures have more than 8 bits per channel."]
     HAS_DEEP_TEXELS: bool = true;
+    #[doc = "Some material has textures on more than two sets of texture coordinates."]
+    HAS_MANY_TEXCOORDS: bool = true;
     #[doc = "Entries of the traversal stack."]
     STACK_SIZE: uint = 64;
     #[doc = "Rays per invocation in the kernel that traces single rays."]

@@ -52,7 +52,7 @@ impl AlphaTest {
         if let Geometry::Triangles(t) = &mesh.geometry {
             if let Some(slot) = material.base_color_texture {
                 test.texture = scene.textures.get(slot.texture).map(|x| (x.clone(), slot.transform));
-                test.texcoords = t.texcoords.get(slot.texcoord).cloned().unwrap_or_default();
+                test.texcoords = t.texcoord_set(slot.texcoord).to_vec();
             }
             test.vertex_alpha = t.colors.iter().map(|c| c.w).collect();
             test.indices = t.indices.clone();

@@ -6,17 +6,20 @@
 use glam::DVec3;
 
 use super::settings::{DEFAULT_SIZE, options_text, size_of_aspect};
+use super::shell::quoted;
 use super::survey::own_light::{self, OwnLight};
 use super::survey::radius::{CLOSED, TARGET};
 use super::survey::{Survey, framing, light, radius, significant};
 use super::{RenderSettings, Renderer};
 use crate::error::Result;
 use crate::integrators::lighting::LightingSettings;
-use crate::scene::{Camera, ClipPlanes, Scene};
+use crate::scene::{Camera, ClipPlanes, Scene, SceneSettings};
 use crate::settings::{Capability, Length};
 
 /// Metadata key of the options that were chosen ([`Completed::chosen`]).
 pub const CHOSEN: &str = "chosen";
+/// Metadata key of the options by which the scene was loaded ([`Renderer::scene_options`]).
+pub const SCENE_OPTIONS: &str = "scene.options";
 
 /// AO radius of scenes that are too large to be looked at, as a share of the diagonal.
 const LARGE_SCENE_RADIUS: f64 = 0.05;
@@ -130,6 +133,14 @@ impl Renderer {
         }
         self.lighting.own_light = own_light;
         Ok(Completed { camera, settings, chosen, choices })
+    }
+
+    /// The options by which the scene was loaded and its file understood, as text: `--gltf-scene`,
+    /// `--normals`, `--uv`, `--variant`, `--mtl-dissolve`; `None` if all are the defaults.
+    pub fn scene_options(&self, settings: &SceneSettings) -> Option<String> {
+        let understood = RenderSettings { scene: settings.clone(), ..Default::default() }.flags();
+        let words = self.scene.report.options.iter().chain(&understood);
+        Some(words.map(|word| quoted(word)).collect::<Vec<_>>().join(" ")).filter(|text| !text.is_empty())
     }
 
     /// Lights a dark scene that is seen from many places, by integrators of which some need it.

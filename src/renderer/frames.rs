@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::brightness;
-use super::complete::{CHOSEN, Completed};
+use super::complete::{CHOSEN, Completed, SCENE_OPTIONS};
 use super::laps::{self, Laps};
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
 use super::still::{aov_needs, camera_text, spp_text};
@@ -146,7 +146,7 @@ impl Renderer {
         }
 
         // Metadata of images, and the report.
-        let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings);
+        let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), &settings.scene, warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
         let mut metadata = match &options {
@@ -179,6 +179,7 @@ impl Renderer {
             ("version", env!("CARGO_PKG_VERSION").into()),
         ]);
         metadata.extend(chosen.map(|options| (CHOSEN, options)));
+        metadata.extend(setup.scene_options.clone().map(|options| (SCENE_OPTIONS, options)));
         let report = FramesReport {
             integrator,
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },

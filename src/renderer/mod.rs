@@ -56,7 +56,7 @@ use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 use survey::own_light::OwnLight;
 
-pub use complete::{CHOSEN, Completed};
+pub use complete::{CHOSEN, Completed, SCENE_OPTIONS};
 pub use frames::{FrameOutput, Frames};
 pub use interactive::{Interactive, View};
 pub use quality::Quality;

@@ -17,7 +17,7 @@ use crate::integrators::{IntegratorName, IntegratorReport};
 use crate::measure::stats::{Summary, percentile};
 use crate::raster::Primary;
 use crate::realtime::{FrameStats, Preset, Settings};
-use crate::scene::{Camera, RenderHints};
+use crate::scene::{Camera, RenderHints, SceneSettings};
 use crate::settings::Capability;
 use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 
@@ -62,6 +62,9 @@ impl Seconds {
 pub struct Setup {
     /// The scene as named by the user.
     pub scene: String,
+    /// The options by which it was loaded and understood; `None`: the defaults
+    /// ([`Renderer::scene_options`]).
+    pub scene_options: Option<String>,
     /// Triangles over all instances.
     pub triangles: u64,
     /// Spheres over all instances.
@@ -103,11 +106,13 @@ impl Setup {
         flat: &FlatScene,
         camera: &Camera,
         (choices, chosen): (Vec<String>, Option<String>),
+        settings: &SceneSettings,
         warnings: Vec<String>,
     ) -> Self {
         let (scene, info) = (flat.scene, &renderer.device.info);
         Self {
             scene: renderer.name.clone(),
+            scene_options: renderer.scene_options(settings),
             triangles: scene.triangle_count(),
             spheres: scene.sphere_count(),
             degenerate_triangles: scene.report.degenerate_triangles,
@@ -130,6 +135,7 @@ impl Setup {
     fn record(&self, seconds: &Seconds) -> Map<String, Value> {
         let mut record = json!({
             "scene": self.scene,
+            "scene_options": self.scene_options,
             "triangles": self.triangles,
             "spheres": self.spheres,
             "degenerate_triangles": self.degenerate_triangles,

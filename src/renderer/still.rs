@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::brightness;
-use super::complete::{CHOSEN, Completed};
+use super::complete::{CHOSEN, Completed, SCENE_OPTIONS};
 use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, RenderedBy};
 use super::laps::{self, Laps};
@@ -409,7 +409,7 @@ impl<'a> StillRender<'a> {
         let compute = tracer.compute_options();
         let choices = (choices.iter().cloned().chain(chosen_exposure).collect(), self.chosen);
         StillReport {
-            setup: Setup::new(self.renderer, tracer, flat, camera, choices, self.warnings),
+            setup: Setup::new(self.renderer, tracer, flat, camera, choices, &settings.scene, self.warnings),
             integrator: integrator.name(),
             quantity: integrator.quantity(),
             size: job.samples.size,
@@ -538,6 +538,8 @@ impl Composer<'_> {
         let StillRender { renderer, completed, job, .. } = self.render;
         let mut out =
             vec![("scene", files::portable_name(&renderer.name)), ("spp", spp_text(image.spp, image.max_spp))];
+        let options = renderer.scene_options(&completed.settings.scene);
+        out.extend(options.map(|options| (SCENE_OPTIONS, options)));
         out.extend(camera_numbers::metadata(job.camera, job.aspect()));
         out.extend(self.render.rendered_by.iter().cloned());
         out.extend(self.render.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));

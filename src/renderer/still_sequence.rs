@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::complete::Completed;
+use super::complete::{Completed, SCENE_OPTIONS};
 use super::frames::{DEFAULT_FPS, camera_motion};
 use super::laps::Laps;
 use super::still::{Still, StillExtras, identity};
@@ -123,11 +123,13 @@ impl StillSequence<'_> {
             None => !image.metadata.iter().any(|(k, _)| k == key) || key.ends_with(".hash"),
         });
         let scene = crate::files::portable_name(&self.renderer.name);
+        let options = self.renderer.scene_options(&settings.scene);
+        let same_options = image.metadata(SCENE_OPTIONS) == options.as_deref();
         let has_samples = match settings.film.quality {
             Some(quality) => has("quality", quality.name()),
             None => has("spp", &job.samples.spp.to_string()),
         };
-        Ok(same && has_samples && has("scene", &scene) && [image.width, image.height] == self.size())
+        Ok(same && same_options && has_samples && has("scene", &scene) && [image.width, image.height] == self.size())
     }
 
     /// Renders the still of a frame. Animations loop.

@@ -24,6 +24,7 @@ pub fn of_scene(scene: &Scene) -> String {
                 clearcoat_tangents,
                 anisotropy_tangents,
                 texcoords,
+                more_texcoords,
                 colors,
             }) => {
                 hash.slice(positions);
@@ -31,7 +32,7 @@ pub fn of_scene(scene: &Scene) -> String {
                 hash.slice(normals);
                 hash.slice(tangents);
                 [clearcoat_tangents, anisotropy_tangents].iter().filter(|t| !t.is_empty()).for_each(|t| hash.slice(t));
-                texcoords.iter().for_each(|t| hash.slice(t));
+                texcoords.iter().chain(more_texcoords).for_each(|t| hash.slice(t));
                 hash.slice(colors);
             }
             Geometry::Spheres(spheres) => {

@@ -10,7 +10,7 @@ use glam::{Affine2, Vec3, Vec4};
 pub struct TextureSlot {
     /// Index into [`super::Scene::textures`].
     pub texture: usize,
-    /// Which set of texture coordinates: 0 or 1.
+    /// Which set of texture coordinates.
     pub texcoord: usize,
     /// KHR_texture_transform, applied to the coordinates; identity without it.
     pub transform: Affine2,

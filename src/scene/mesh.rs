@@ -21,8 +21,43 @@ pub struct TriangleMesh {
     pub anisotropy_tangents: Vec<Vec4>,
     /// Texture coordinate sets 0 and 1, glTF convention (v down).
     pub texcoords: [Vec<Vec2>; 2],
+    /// Texture coordinate sets from 2 on, which few meshes have: those that a material with
+    /// textures on more than two sets uses.
+    pub more_texcoords: Vec<Vec<Vec2>>,
     /// Linear vertex colours with alpha.
     pub colors: Vec<Vec4>,
+}
+
+impl TriangleMesh {
+    /// Number of sets of texture coordinates, of which some may be empty.
+    pub fn texcoord_sets(&self) -> usize {
+        self.texcoords.len() + self.more_texcoords.len()
+    }
+
+    /// A set of texture coordinates, empty where the mesh does not have it.
+    pub fn texcoord_set(&self, set: usize) -> &[Vec2] {
+        let mut sets = self.texcoords.iter().chain(&self.more_texcoords);
+        sets.nth(set).map_or(&[], Vec::as_slice)
+    }
+
+    /// A set of texture coordinates to be changed, which is made, empty, where the mesh does not
+    /// have it.
+    pub fn texcoord_set_mut(&mut self, set: usize) -> &mut Vec<Vec2> {
+        match set.checked_sub(self.texcoords.len()) {
+            None => &mut self.texcoords[set],
+            Some(more) => {
+                if self.more_texcoords.len() <= more {
+                    self.more_texcoords.resize_with(more + 1, Vec::new);
+                }
+                &mut self.more_texcoords[more]
+            }
+        }
+    }
+
+    /// All sets of texture coordinates, to be changed.
+    pub fn texcoord_sets_mut(&mut self) -> impl Iterator<Item = &mut Vec<Vec2>> {
+        self.texcoords.iter_mut().chain(&mut self.more_texcoords)
+    }
 }
 
 /// An analytic sphere in object space.
@@ -46,6 +81,7 @@ impl Sphere {
 
 /// Geometry of a mesh.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nearly all geometry is triangles, and vertices are what takes memory")]
 pub enum Geometry {
     /// Indexed triangles.
     Triangles(TriangleMesh),

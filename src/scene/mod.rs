@@ -67,6 +67,8 @@ pub struct LoadReport {
     /// Files that it was read from: models, materials, buffers and images, also those that could
     /// not be read.
     pub files: Vec<PathBuf>,
+    /// Options that decided what was loaded ([`load::LoadOptions::flags`]).
+    pub options: Vec<String>,
     /// Names and texts of what a glTF file says of itself (KHR_xmp_json_ld).
     pub metadata: Vec<(String, String)>,
     /// Names of the scenes of a glTF file, of which one is loaded.

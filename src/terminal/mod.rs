@@ -4,6 +4,7 @@
 pub mod console;
 pub mod interrupt;
 pub mod lines;
+pub mod loading;
 pub mod panic;
 pub mod progress;
 pub mod warnings;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
 use super::needs::Needs;
 use super::shading;
@@ -108,6 +108,13 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute
             let side = if part.mirrored { -1.0 } else { 1.0 };
             let bake = |t: &Vec4| (m * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(side * t.w);
             Cow::Owned(bytemuck::cast_slice(&tangents(t, k).iter().map(bake).collect::<Vec<_>>()).to_vec())
+        }
+        Attribute::Texcoords(1) if !t.more_texcoords.is_empty() => {
+            // sets from 1 on, those of a vertex side by side
+            let sets: Vec<&[Vec2]> = (1..t.texcoord_sets()).map(|set| t.texcoord_set(set)).collect();
+            let at = |vertex: usize| sets.iter().map(move |set| set.get(vertex).copied().unwrap_or_default());
+            let side_by_side: Vec<Vec2> = (0..t.positions.len()).flat_map(at).collect();
+            Cow::Owned(bytemuck::cast_slice(&side_by_side).to_vec())
         }
         Attribute::Texcoords(set) => Cow::Borrowed(bytemuck::cast_slice(&t.texcoords[set])),
         Attribute::Colors => Cow::Borrowed(bytemuck::cast_slice(&t.colors)),

@@ -23,7 +23,7 @@ use crate::interface::records::ray::INVALID;
 use crate::interface::records::scene::{InstanceRecord, MaterialRecord, SceneRoot, SubmeshRecord};
 use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures};
-use crate::scene::Material;
+use crate::scene::{Geometry, Material};
 
 /// Number and size of mip levels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -355,7 +355,10 @@ fn submesh_records(
                 material: flat.scene.meshes[part.mesh].material as u32,
                 scene_instance: part.scene_instance.map_or(INVALID, |i| i as u32),
                 mirrored: part.mirrored as u32,
-                sphere_textures: flat.has_sphere_textures(part).into(),
+                texcoord_sets: match &flat.scene.meshes[part.mesh].geometry {
+                    Geometry::Triangles(t) => 1 + t.more_texcoords.len() as u32,
+                    Geometry::Spheres(_) => flat.has_sphere_textures(part).into(),
+                },
                 tangents: attributes.address(part, k, Attribute::Tangents(0)),
                 clearcoat_tangents: attributes.address(part, k, Attribute::Tangents(1)),
                 anisotropy_tangents: attributes.address(part, k, Attribute::Tangents(2)),

@@ -99,7 +99,8 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
         .set(constants::HAS_SPHERES, features.spheres)
         .set(constants::SINGLE_LEVEL, features.single_level)
         .set(constants::HAS_COVERAGE, features.stochastic_alpha)
-        .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
+        .set(constants::HAS_DEEP_TEXELS, features.deep_texels)
+        .set(constants::HAS_MANY_TEXCOORDS, features.many_texcoords);
     match features.shading {
         Some(shading) => s
             .set_all(shading.bsdfs.constants())

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
 use crate::renderer::RenderSettings;
 use crate::scene::builtin;
-use crate::scene::load::confine;
+use crate::scene::load::{Confine, LoadOptions, Projection, VertexOptions, confine};
 use crate::tracer::TracerKind;
 
 /// Name of the manifest in its folder.
@@ -48,6 +48,8 @@ pub struct Frame {
     pub scene: String,
     /// Which scene of a glTF file, by its name or number; `None`: the one that the file names.
     pub gltf_scene: Option<String>,
+    /// Normals and texture coordinates that are not the file's.
+    pub vertices: VertexOptions,
     pub settings_file: Option<PathBuf>,
     /// The settings; files are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
@@ -123,12 +125,22 @@ struct Defaults {
     drivers: Option<Vec<String>>,
 }
 
+/// The value of `normals`: a word, or an angle in degrees.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Normals {
+    Word(String),
+    Angle(f64),
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
     name: Spanned<String>,
     scene: Spanned<String>,
     gltf_scene: Option<Spanned<String>>,
+    normals: Option<Spanned<Normals>>,
+    uv: Option<Spanned<String>>,
     render: Option<Spanned<String>>,
     settings: Option<Spanned<PathBuf>>,
     tracers: Option<Spanned<Vec<String>>>,
@@ -322,11 +334,15 @@ impl Frame {
         if self.tolerance.allows_other_seeds() {
             settings.image.seed = None;
         }
-        let chosen = self.gltf_scene.iter().flat_map(|scene| {
-            let word = shlex::try_quote(scene).map_or_else(|_| scene.clone(), |word| word.into_owned());
-            ["--gltf-scene".to_owned(), word]
-        });
-        chosen.chain(settings.flags()).collect::<Vec<_>>().join(" ")
+        let load = self.load_options(Confine::Nowhere).flags();
+        let quoted = |word: String| shlex::try_quote(&word).map_or_else(|_| word.clone(), |quoted| quoted.into_owned());
+        load.into_iter().map(quoted).chain(settings.flags()).collect::<Vec<_>>().join(" ")
+    }
+
+    /// How its scene is loaded. `confine`: where the files must lie that it refers to.
+    pub fn load_options<'a>(&'a self, confine: Confine<'a>) -> LoadOptions<'a> {
+        let (scene, vertices) = (self.gltf_scene.as_deref(), self.vertices);
+        LoadOptions { confine, scene, vertices, ..LoadOptions::default() }
     }
 
     /// Whether it is rendered on this driver.
@@ -352,6 +368,7 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
         name: one_line(entry.name.get_ref()),
         scene: entry.scene.get_ref().clone(),
         gltf_scene: entry.gltf_scene.as_ref().map(|scene| scene.get_ref().clone()),
+        vertices: VertexOptions::default(),
         settings_file: entry.settings.as_ref().map(|file| folder.join(file.get_ref())),
         settings: RenderSettings::default(),
         tracers: Tracers::Auto,
@@ -365,6 +382,25 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
         frame.problem = Some(e.to_string());
     }
     frame
+}
+
+/// The normals and texture coordinates that an entry asks for.
+fn vertices(source: &Source, entry: &Entry) -> Result<VertexOptions> {
+    let mut vertices = VertexOptions::default();
+    if let Some(normals) = &entry.normals {
+        let text = match normals.get_ref() {
+            Normals::Word(word) => word.clone(),
+            Normals::Angle(degrees) => degrees.to_string(),
+        };
+        vertices.normals = text.parse().map_err(|e| source.error(normals.span(), format!("normals = {text}: {e}")))?;
+    }
+    if let Some(uv) = &entry.uv {
+        let projection = Projection::ALL.into_iter().find(|p| p.name() == uv.get_ref());
+        let names = || Projection::ALL.map(Projection::name).join(", ");
+        let unknown = || source.error(uv.span(), format!("uv = {}: one of {} expected", uv.get_ref(), names()));
+        vertices.uv = Some(projection.ok_or_else(unknown)?);
+    }
+    Ok(vertices)
 }
 
 /// Reads what may be wrong with a frame.
@@ -387,6 +423,7 @@ fn complete(
             source.error(chosen.span(), format!("gltf_scene: {} is no glTF file, which may have several", frame.scene))
         );
     }
+    frame.vertices = vertices(source, entry)?;
     frame.settings = settings(source, folder, defaults, entry)?;
     let golden = folder.join(format!("{}.{}", frame.name, frame.format.extension()));
     let environment = frame.settings.lighting.environment_file();
@@ -521,6 +558,36 @@ mod tests {
         std::fs::write(dir.path().join(NAME), EXAMPLE.replace("hall.glb", "builtin:plane")).unwrap();
         let frames = Manifest::load(dir.path()).unwrap().frames;
         assert!(frames.len() == 1 && frames[0].tolerance.z_test.is_some(), "{frames:?}");
+    }
+
+    /// Normals and texture coordinates are keys of a frame, and options of its command.
+    #[test]
+    fn normals_and_texture_coordinates_are_chosen() {
+        let dir = tempfile::tempdir().unwrap();
+        let frame = |keys: &str| {
+            let text = EXAMPLE.replace("scene = \"hall.glb\"", &format!("scene = \"builtin:plane\", {keys}"));
+            std::fs::write(dir.path().join(NAME), text).unwrap();
+            Manifest::load(dir.path()).map(|manifest| manifest.frames[0].clone())
+        };
+        for (keys, options) in [
+            ("normals = \"flat\"", "--normals flat "),
+            ("normals = \"smooth\", uv = \"box\"", "--normals smooth --uv box "),
+            ("normals = 30", "--normals 30 "),
+            ("normals = 30.5", "--normals 30.5 "),
+            ("normals = \"file\"", "--integrator ao "),
+        ] {
+            let frame = frame(keys).unwrap();
+            assert!(frame.problem.is_none() && frame.render_text().starts_with(options), "{keys}: {frame:?}");
+        }
+        for (keys, why) in [
+            ("normals = \"round\"", "line 1: normals = round: file, flat, smooth or an angle from 0 to 180 degrees"),
+            ("normals = 181", "line 1: normals = 181: file, flat"),
+            ("uv = \"planar\"", "line 1: uv = planar: one of spherical, cylindrical, box expected"),
+        ] {
+            let problem = frame(keys).unwrap().problem.unwrap();
+            assert!(problem.contains(why), "{keys}: {problem}");
+        }
+        assert!(frame("uv = true").unwrap_err().to_string().contains("line 1"));
     }
 
     #[test]

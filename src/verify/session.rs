@@ -10,7 +10,7 @@ use crate::film::Control;
 use crate::gpu::{Device, DeviceInfo, Options};
 use crate::output::Image;
 use crate::renderer::Renderer;
-use crate::scene::load::{self, Confine, LoadOptions};
+use crate::scene::load::{self, Confine, VertexOptions};
 use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
 
 /// Compiled pipelines kept from scene to scene: most of what small images cost on a CPU driver.
@@ -27,6 +27,7 @@ pub struct VerifySession<'m> {
 struct OpenRenderer {
     scene: String,
     gltf_scene: Option<String>,
+    vertices: VertexOptions,
     kind: TracerKind,
     renderer: Renderer,
 }
@@ -88,22 +89,21 @@ impl<'m> VerifySession<'m> {
             TracerKind::Compute => TracerChoice::Compute,
         };
         let confine = self.manifest.confine.as_deref().map_or(Confine::Nowhere, Confine::Folder);
-        let is_scene = |open: &OpenRenderer| open.scene == frame.scene && open.gltf_scene == frame.gltf_scene;
+        let is_scene = |open: &OpenRenderer| {
+            open.scene == frame.scene && open.gltf_scene == frame.gltf_scene && open.vertices == frame.vertices
+        };
         let open = match self.open.take() {
             Some(open) if is_scene(&open) && open.kind == kind => open,
             before => {
                 let scene = match before {
                     Some(open) if is_scene(&open) => open.renderer.into_scene(),
-                    _ => load::load_with(
-                        &self.manifest.scene(frame),
-                        &LoadOptions { confine, scene: frame.gltf_scene.as_deref(), ..LoadOptions::default() },
-                    )?,
+                    _ => load::load_with(&self.manifest.scene(frame), &frame.load_options(confine))?,
                 };
                 let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
                 // the manifest's name: a golden image is the same whichever folder it was made in
                 let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
                 let (scene, gltf_scene) = (frame.scene.clone(), frame.gltf_scene.clone());
-                OpenRenderer { scene, gltf_scene, kind, renderer }
+                OpenRenderer { scene, gltf_scene, vertices: frame.vertices, kind, renderer }
             }
         };
         Ok(&mut self.open.insert(open).renderer)

@@ -29,6 +29,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
+use crate::scene::load::{LoadOptions, VertexOptions};
 use crate::scene::settings::variant_index;
 use crate::scene::{Camera, Projection};
 use crate::settings::{Capability, Length};
@@ -205,6 +206,10 @@ pub struct App {
     exposure: (bool, Option<f64>),
     /// Which scene of a glTF file is shown; none: the one that the file names.
     pub gltf_scene: Option<String>,
+    /// Normals and texture coordinates of all scenes that are opened.
+    pub vertices: VertexOptions,
+    /// Normals and texture coordinates of the last scene that was opened.
+    opened_vertices: VertexOptions,
     /// Text to be put on the clipboard.
     pub copied: Option<String>,
     /// The window is to be closed.
@@ -270,6 +275,8 @@ impl App {
             first_animation: None,
             exposure: (false, None),
             gltf_scene: options.gltf_scene.clone(),
+            vertices: options.vertices,
+            opened_vertices: options.vertices,
             copied: None,
             closes: false,
             default_frame_rate: options.frame_rate.unwrap_or(CPU_FRAME_RATE),
@@ -372,8 +379,14 @@ impl App {
             self.gltf_scene = None;
         }
         self.source = Some(source.to_owned());
+        self.opened_vertices = self.vertices;
         (self.modified, self.failure) = (None, None);
         self.loading = Some((format!("loading {source}"), None));
+    }
+
+    /// Normals and texture coordinates of the last scene that was opened.
+    pub fn opened_vertices(&self) -> VertexOptions {
+        self.opened_vertices
     }
 
     /// Stops loading: the scene before stays.
@@ -760,6 +773,7 @@ impl App {
         let request = Request {
             scene: self.source.clone(),
             gltf_scene: self.gltf_scene.clone(),
+            vertices: self.vertices,
             load: self.load,
             device: self.device_settings.clone(),
             meaning: self.settings.scene.clone(),
@@ -1000,8 +1014,14 @@ impl App {
         let source = self.scene.as_ref().map_or("", |s| s.source.as_str());
         Ok(render_command(
             source,
+            &self.load_flags(),
             &RenderSettings { image: ImageSettings { size: Some(self.size), ..settings.image }, ..settings },
         ))
+    }
+
+    /// The options by which the scene is loaded, as words of the command line.
+    fn load_flags(&self) -> Vec<String> {
+        LoadOptions { scene: self.gltf_scene.as_deref(), vertices: self.vertices, ..LoadOptions::default() }.flags()
     }
 
     /// The frame rate to hold unless another is chosen.
@@ -1023,6 +1043,7 @@ impl App {
             .arg(source)
             // defaults are among the settings already
             .args(["--quiet", "--no-config", "-o", output])
+            .args(self.load_flags())
             .args(settings.flags())
             .stdin(std::process::Stdio::null())
             .stderr(std::process::Stdio::piped())

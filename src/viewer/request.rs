@@ -13,6 +13,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
+use crate::scene::load::VertexOptions;
 use crate::scene::{Camera, SceneSettings};
 use crate::tracer::DeviceSettings;
 
@@ -29,6 +30,8 @@ pub struct Request {
     pub scene: Option<String>,
     /// Which scene of a glTF file; none: the one that the file names.
     pub gltf_scene: Option<String>,
+    /// Normals and texture coordinates that are not the file's.
+    pub vertices: VertexOptions,
     /// Incremented to load the scene anew.
     pub load: u64,
     /// Device and tracer.

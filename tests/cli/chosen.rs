@@ -154,3 +154,38 @@ fn gpu_commands_of_ao_vs_path_have_the_error_that_it_finds() {
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     assert!(text.contains("1 spp, path") && text.contains("(limit 1)"), "{text}");
 }
+
+/// Options that decide what is made of the scene's file are in the record and in the metadata of images, and make the same image again.
+#[test]
+fn gpu_options_of_the_scene_are_noted() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let scene = bare(&dir, "stairs");
+    let [exr, frames, again, plain] = ["a.exr", "f.#.exr", "b.exr", "c.exr"].map(|name| place(&dir, name));
+    let render = |output: &str, options: &[&str]| {
+        let first = ["render", &scene, "-o", output, "--size", "32x24", "--spp", "2", "--json"];
+        json(&run(&first.into_iter().chain(options.iter().copied()).collect::<Vec<_>>()))
+    };
+    let noted = "--gltf-scene 0 --normals 30 --uv box --mtl-dissolve glass";
+    let options: Vec<&str> = noted.split(' ').collect();
+    let record = render(&exr, &options);
+    assert_eq!(record["scene_options"], noted);
+    assert_eq!(load(&exr).metadata("scene.options"), Some(noted));
+    let realtime = json(&run(&[
+        &["render", scene.as_str(), "-o", &frames, "--size", "32x24", "--frames", "0..1", "--json"],
+        &options[..],
+    ]
+    .concat()));
+    assert_eq!(realtime["scene_options"], noted);
+    assert_eq!(load(&frames.replace('#', "0")).metadata("scene.options"), Some(noted));
+
+    // what is noted makes the image again, and nothing is noted of defaults
+    let words = words(load(&exr).metadata("scene.options").unwrap());
+    render(&again, &words.iter().map(String::as_str).collect::<Vec<_>>());
+    let bits = |path: &str| load(path).f32("Y").unwrap().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&exr), bits(&again));
+    assert!(render(&plain, &["--normals", "file"])["scene_options"].is_null());
+    assert_eq!(load(&plain).metadata("scene.options"), None);
+}

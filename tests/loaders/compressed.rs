@@ -367,15 +367,209 @@ fn with_texture(file: &[u8]) -> Doc {
 }
 
 /// A KTX2 file with one level and the shortest description of its data.
-fn ktx2(format: u32, type_size: usize, [width, height]: [u32; 2], data: &[u8]) -> Vec<u8> {
+fn ktx2(format: u32, type_size: usize, size: [u32; 2], data: &[u8]) -> Vec<u8> {
+    ktx2_of_levels(format, type_size, size, &[data])
+}
+
+/// The same with several levels, the largest first; files have it last.
+fn ktx2_of_levels(format: u32, type_size: usize, [width, height]: [u32; 2], levels: &[&[u8]]) -> Vec<u8> {
     let mut file = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
     let mut put = |words: &[u32]| file.extend(words.iter().flat_map(|w| w.to_le_bytes()));
-    put(&[format, type_size as u32, width, height, 0, 0, 1, 1, 0]);
+    put(&[format, type_size as u32, width, height, 0, 0, 1, levels.len() as u32, 0]);
     // descriptor of 4 + 24 bytes after the table of levels; no keys, no global data
-    let (descriptor, level) = (104, 132);
+    let descriptor = 80 + 24 * levels.len() as u32;
     put(&[descriptor, 28, 0, 0, 0, 0, 0, 0]);
-    put(&[level, 0, data.len() as u32, 0, data.len() as u32, 0]);
+    for (k, level) in levels.iter().enumerate() {
+        let before: usize = levels[k + 1..].iter().map(|l| l.len()).sum();
+        put(&[descriptor + 28 + before as u32, 0, level.len() as u32, 0, level.len() as u32, 0]);
+    }
     put(&[28, 0, 2 | 24 << 16, 1, 0, 0, 0]);
-    file.extend_from_slice(data);
+    levels.iter().rev().for_each(|level| file.extend_from_slice(level));
     file
+}
+
+/// Stored levels are skipped: the texture is that of the largest one.
+#[test]
+fn ktx2_with_levels() {
+    let largest: Vec<u8> = (0..4 * 4 * 2).map(|k| 8 * k as u8).collect();
+    let with = with_texture(&ktx2_of_levels(37, 1, [4, 2], &[&largest, &[255; 8], &[254; 4]])).load();
+    let without = with_texture(&ktx2(37, 1, [4, 2], &largest)).load();
+    for scene in [&with, &without] {
+        let [texture] = &scene.textures[..] else { panic!("{:?}", scene.report.warnings) };
+        assert_eq!((texture.width, texture.height, texture.texels.as_bytes()), (4, 2, &largest[..]));
+    }
+}
+
+/// A DDS file: flags of its pixel format, its four letters or number, bits a pixel and masks, and what follows the header.
+fn dds(size: [u32; 2], flags: u32, code: [u8; 4], bits: u32, masks: [u32; 4], rest: &[u8]) -> Vec<u8> {
+    let mut words = [0u32; 31];
+    (words[0], words[1], words[2], words[3]) = (124, 0x1007, size[1], size[0]);
+    (words[18], words[19], words[20], words[21]) = (32, flags, u32::from_le_bytes(code), bits);
+    words[22..26].copy_from_slice(&masks);
+    words[26] = 0x1000;
+    let mut file = b"DDS ".to_vec();
+    file.extend(words.iter().flat_map(|w| w.to_le_bytes()));
+    file.extend_from_slice(rest);
+    file
+}
+
+/// One of Direct3D 9, by letters or number.
+fn dds_9(size: [u32; 2], code: [u8; 4], data: &[u8]) -> Vec<u8> {
+    dds(size, 0x4, code, 0, [0; 4], data)
+}
+
+/// One of Direct3D 10: format, dimension, kind, layers.
+fn dds_10(size: [u32; 2], [format, dimension, kind, layers]: [u32; 4], data: &[u8]) -> Vec<u8> {
+    let rest: Vec<u8> = [format, dimension, kind, layers, 0].iter().flat_map(|w| w.to_le_bytes()).collect();
+    dds_9(size, *b"DX10", &[rest.as_slice(), data].concat())
+}
+
+/// A triangle that shows an image by `MSFT_texture_dds`; what its file is besides is not told.
+fn with_dds(file: &[u8]) -> Doc {
+    let mut doc = with_texture(file);
+    doc.json["textures"][0] = json!({ "extensions": { "MSFT_texture_dds": { "source": 0 } } });
+    doc.json["images"][0]["uri"] = json!(format!("data:image/vnd-ms.dds;base64,{}", base64(file)));
+    doc.json["images"][0]["mimeType"] = json!("image/vnd-ms.dds");
+    doc.json["extensionsUsed"] = json!(["MSFT_texture_dds"]);
+    doc.json["extensionsRequired"] = json!(["MSFT_texture_dds"]);
+    doc
+}
+
+/// Blocks and plain numbers in DDS: all four corners of a block are its first pixel.
+#[test]
+fn dds_of_all_kinds() {
+    let red = [0x00, 0xf8, 0x00, 0xf8, 0, 0, 0, 0];
+    let halves = |x: [u16; 4]| x.into_iter().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    let singles = |x: [f32; 4]| x.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+    // alpha or one channel: two ends that are the same
+    let ends = |value: u8| [value, value, 0, 0, 0, 0, 0, 0];
+    // mode 6 of BC7: seven bits of each end and a last one that they share, all indices 0
+    let bc7 = {
+        let mut bits: u128 = 1 << 6;
+        for (k, value) in [100u128, 100, 50, 50, 25, 25, 127, 127].into_iter().enumerate() {
+            bits |= value << (7 + 7 * k);
+        }
+        (bits | 0b11 << 63).to_le_bytes()
+    };
+    // mode 11 of BC6H: 10 bits of each end, all indices 0
+    let bc6h = {
+        let mut bits: u128 = 0b00011;
+        for (k, value) in [0x1e0u128, 0x0f0, 0].into_iter().enumerate() {
+            bits |= value << (5 + 10 * k) | value << (35 + 10 * k);
+        }
+        bits.to_le_bytes()
+    };
+    // as the format unquantizes and finishes it
+    let of_bc6h = |value: u32| {
+        let half = ((value << 16) + 0x8000) >> 10;
+        let half = (half * 31) >> 6;
+        let (exponent, mantissa) = (half >> 10, half & 0x3ff);
+        (1.0 + mantissa as f32 / 1024.0) * 2f32.powi(exponent as i32 - 15)
+    };
+    let byte = |x: u32| x as f32 / 255.0;
+    // two channels are a normal map, whose third follows
+    let third = |x: f32, y: f32| 0.5 + 0.5 * (1.0 - (2.0 * x - 1.0).powi(2) - (2.0 * y - 1.0).powi(2)).sqrt();
+    let cases: Vec<(&str, Vec<u8>, [f32; 4])> = vec![
+        ("BC1", dds_9([4, 4], *b"DXT1", &red), [1.0, 0.0, 0.0, 1.0]),
+        ("BC2", dds_9([4, 4], *b"DXT3", &[[0x33; 8], red].concat()), [1.0, 0.0, 0.0, 0.2]),
+        ("BC3", dds_9([4, 4], *b"DXT5", &[ends(51), red].concat()), [1.0, 0.0, 0.0, 0.2]),
+        ("BC4", dds_9([4, 4], *b"ATI1", &ends(51)), [0.2, 0.0, 0.0, 1.0]),
+        ("BC5", dds_9([4, 4], *b"BC5U", &[ends(153), ends(102)].concat()), [0.6, 0.4, third(0.6, 0.4), 1.0]),
+        ("BC1 of DXGI", dds_10([4, 4], [72, 3, 0, 1], &red), [1.0, 0.0, 0.0, 1.0]),
+        ("BC6H", dds_10([4, 4], [95, 3, 0, 1], &bc6h), [of_bc6h(0x1e0), of_bc6h(0x0f0), 0.0, 1.0]),
+        ("BC7", dds_10([4, 4], [98, 3, 0, 1], &bc7), [byte(201), byte(101), byte(51), 1.0]),
+        ("RGBA8", dds_10([1, 1], [29, 3, 0, 1], &[255, 51, 0, 102]), [1.0, 0.2, 0.0, 0.4]),
+        ("BGRA8", dds_10([1, 1], [87, 3, 0, 1], &[0, 51, 255, 102]), [1.0, 0.2, 0.0, 0.4]),
+        ("BGRX8", dds_10([1, 1], [88, 3, 0, 1], &[0, 51, 255, 102]), [1.0, 0.2, 0.0, 1.0]),
+        ("RGBA16", dds_10([1, 1], [11, 3, 0, 1], &halves([0xffff, 0x3333, 0, 0x6666])), [1.0, 0.2, 0.0, 0.4]),
+        ("RGBA16F", dds_9([1, 1], 113u32.to_le_bytes(), &halves([0x3c00, 0x4000, 0, 0x3800])), [1.0, 2.0, 0.0, 0.5]),
+        ("RGBA32F", dds_10([1, 1], [2, 3, 0, 1], &singles([1.5, 0.5, f32::NAN, 1.0])), [1.5, 0.5, 0.0, 1.0]),
+        (
+            "A8R8G8B8",
+            dds([1, 1], 0x41, [0; 4], 32, [0xff_0000, 0xff00, 0xff, 0xff00_0000], &[0, 51, 255, 102]),
+            [1.0, 0.2, 0.0, 0.4],
+        ),
+        ("R8G8B8", dds([1, 1], 0x40, [0; 4], 24, [0xff_0000, 0xff00, 0xff, 0], &[0, 51, 255]), [1.0, 0.2, 0.0, 1.0]),
+        ("R5G6B5", dds([1, 1], 0x40, [0; 4], 16, [0xf800, 0x7e0, 0x1f, 0], &[0x00, 0xf8]), [1.0, 0.0, 0.0, 1.0]),
+        ("A1R5G5B5", dds([1, 1], 0x41, [0; 4], 16, [0x7c00, 0x3e0, 0x1f, 0x8000], &[0x1f, 0]), [0.0, 0.0, 1.0, 0.0]),
+        ("L8", dds([1, 1], 0x2_0000, [0; 4], 8, [0xff, 0, 0, 0], &[51]), [0.2, 0.2, 0.2, 1.0]),
+        ("A8L8", dds([1, 1], 0x2_0001, [0; 4], 16, [0xff, 0, 0, 0xff00], &[51, 102]), [0.2, 0.2, 0.2, 0.4]),
+        ("A8", dds([1, 1], 0x2, [0; 4], 8, [0, 0, 0, 0xff], &[102]), [0.0, 0.0, 0.0, 0.4]),
+    ];
+    for (name, file, expected) in &cases {
+        let scene = with_dds(file).load();
+        let [texture] = &scene.textures[..] else { panic!("{name}: {:?}", scene.report.warnings) };
+        let count = texture.texels.len();
+        assert_eq!(count, (texture.width * texture.height) as usize, "{name}");
+        for texel in [texture.texels.get(0), texture.texels.get(count - 1)] {
+            assert!(
+                texel.iter().zip(expected).all(|(a, b)| (a - b).abs() < 3e-3),
+                "{name}: {texel:?}, not {expected:?}"
+            );
+        }
+    }
+
+    // an edge that cuts blocks, and levels that follow the largest one
+    let scene = with_dds(&dds_9([5, 6], *b"DXT1", &[red; 9].concat())).load();
+    assert_eq!((scene.textures[0].width, scene.textures[0].height, scene.textures[0].texels.len()), (5, 6, 30));
+    // without the extension, as some write it, and as a map of an .obj
+    let mut plain = with_dds(&cases[0].1);
+    plain.json["textures"][0] = json!({ "source": 0 });
+    plain.json.as_object_mut().unwrap().retain(|key, _| !key.starts_with("extensions"));
+    assert_eq!(plain.load().textures.len(), 1);
+    let folder = Folder::new();
+    folder.write("t.dds", &cases[0].1);
+    folder.write("a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd t.dds\n");
+    let scene =
+        folder.load("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n").unwrap();
+    assert_eq!(scene.textures[0].texels.get(5), [1.0, 0.0, 0.0, 1.0]);
+}
+
+/// What is wrong with a DDS file, or is no image, leaves the texture out, with a line.
+#[test]
+fn dds_that_are_refused() {
+    let red = [0x00, 0xf8, 0x00, 0xf8, 0, 0, 0, 0];
+    let marked = |at: usize, flags: u32| {
+        let mut file = dds_9([4, 4], *b"DXT1", &red);
+        file[at..at + 4].copy_from_slice(&flags.to_le_bytes());
+        file
+    };
+    for (file, text) in [
+        (dds_9([5, 6], *b"DXT1", &red), "ends early"),
+        (dds_9([16384, 16384], *b"DXT5", &red), "ends early"),
+        (dds_9([4, 4], *b"DXT1", &red)[..100].to_vec(), "ends early"),
+        (dds_10([1, 1], [29, 3, 0, 1], &[])[..140].to_vec(), "ends early"),
+        (dds_9([40_000, 1], *b"DXT1", &red), "40000x1 pixels"),
+        (dds_9([0, 4], *b"DXT1", &red), "0x4 pixels"),
+        (marked(4, 100), "4x4 pixels"),
+        (marked(112, 0xfe00), "cube map"),
+        (marked(112, 0x20_0000), "volume"),
+        (dds_10([4, 4], [98, 3, 4, 1], &[0; 96]), "cube map"),
+        (dds_10([4, 4], [98, 3, 0, 2], &[0; 32]), "array"),
+        (dds_10([4, 4], [98, 4, 0, 1], &[0; 32]), "volume"),
+        (dds_10([4, 4], [84, 3, 0, 1], &[0; 16]), "number 84 of DXGI"),
+        (dds_9([4, 4], *b"DXT2", &[0; 16]), "(DXT2)"),
+        (dds_9([4, 4], 63u32.to_le_bytes(), &[0; 64]), "number 63 of Direct3D 9"),
+        (dds([4, 4], 0x20, [0; 4], 8, [0; 4], &[0; 2000]), "flags 0x20"),
+        (dds([4, 4], 0x40, [0; 4], 12, [0xf00, 0xf0, 0xf, 0], &[0; 64]), "12 bits"),
+    ] {
+        let scene = with_dds(&file).load();
+        let warnings = &scene.report.warnings;
+        assert!(scene.textures.is_empty() && warnings.len() == 1 && warnings[0].contains(text), "{text}: {warnings:?}");
+    }
+}
+
+/// AVIF is not read: a file that requires it is refused by name, and one that has another image besides shows that one.
+#[test]
+fn avif_is_left_to_the_image_beside_it() {
+    let mut doc = with_texture(&png(2, 2, [51, 102, 153, 255]));
+    doc.json["images"][0]["uri"] = json!(format!("data:image/png;base64,{}", base64(&png(2, 2, [51, 102, 153, 255]))));
+    let avif = doc.push("images", json!({ "uri": "t.avif", "mimeType": "image/avif" }));
+    doc.json["textures"][0] = json!({ "source": 0, "extensions": { "EXT_texture_avif": { "source": avif } } });
+    doc.json["extensionsUsed"] = json!(["EXT_texture_avif"]);
+    let scene = doc.load();
+    assert_eq!(scene.textures[0].texels.as_bytes()[..4], [51, 102, 153, 255]);
+    assert_eq!(scene.report.warnings[0], "the extension EXT_texture_avif is ignored");
+    doc.json["extensionsRequired"] = json!(["EXT_texture_avif"]);
+    assert!(doc.error().contains("requires the extension EXT_texture_avif"), "{}", doc.error());
 }

@@ -233,7 +233,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             "path --size 64x48 --spp 16 --max-depth 4 --exposure 1.5",
         ]),
         // `scripts/compressed/make.sh` made the files that these are parts of
-        "draco" | "meshopt" | "ktx2" => {
+        "draco" | "meshopt" | "ktx2" | "dds" => {
             let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(target);
             let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path()).collect();
             files.sort();
@@ -267,6 +267,7 @@ survives! {
     draco 6000,
     meshopt 6000,
     ktx2 6000,
+    dds 6000,
     obj 6000,
     mtl 3000,
     brhan 6000,

@@ -274,7 +274,7 @@ fn texture_transform() {
     assert_eq!(material(&doc.load()).textures().filter(|t| *t == s).count(), 5);
 }
 
-/// A primitive keeps the two sets that its material uses, whatever their numbers.
+/// A primitive keeps the sets that its material uses, whatever their numbers, and however many.
 #[test]
 fn sets_of_texture_coordinates() {
     let load = |material: Value| {
@@ -299,16 +299,28 @@ fn sets_of_texture_coordinates() {
     assert_eq!(mesh(&scene, 0).texcoords[0], TRIANGLE.map(|p| Vec2::new(p[0], p[1])));
     assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
 
-    // a third one is replaced by the first, and named
-    let scene = load(json!({ "emissiveTexture": slot(2), "occlusionTexture": slot(3), "normalTexture": slot(5) }));
+    // a third one, and a fourth, which the file does not have
+    let scene = load(json!({
+        "emissiveTexture": slot(2), "occlusionTexture": slot(3), "normalTexture": slot(5),
+        "pbrMetallicRoughness": { "baseColorTexture": slot(4_000_000_000) },
+    }));
     let material = of_mesh(&scene);
-    let slots = [material.emissive_texture, material.occlusion_texture, material.normal_texture];
-    assert_eq!(slots.map(|s| s.unwrap().texcoord), [0, 1, 0]);
-    assert!(
-        scene.report.warnings.len() == 1 && scene.report.warnings[0].contains("set 5"),
-        "{:?}",
-        scene.report.warnings
-    );
+    let slots =
+        [material.emissive_texture, material.occlusion_texture, material.normal_texture, material.base_color_texture];
+    assert_eq!(slots.map(|s| s.unwrap().texcoord), [0, 1, 2, 3]);
+    let mesh = mesh(&scene, 0);
+    let sets: Vec<Vec2> = (0..mesh.texcoord_sets()).map(|set| mesh.texcoord_set(set)[0]).collect();
+    assert_eq!(sets, [2.0, 3.0, 5.0, 0.0].map(Vec2::splat));
+    let warnings = &scene.report.warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("has no texture coordinates 3"), "{warnings:?}");
+
+    // they are written and read again
+    let folder = Folder::new();
+    let copy = folder.path("copy.glb");
+    skylit::scene::export::export_gltf(&scene, &copy).unwrap();
+    let copy = crate::build::load(&copy).unwrap();
+    assert_eq!(of_mesh(&copy).normal_texture.unwrap().texcoord, 2);
+    assert_eq!(self::mesh(&copy, 0).more_texcoords, mesh.more_texcoords);
 }
 
 #[test]

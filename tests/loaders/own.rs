@@ -58,16 +58,19 @@ fn files_are_small() {
 fn images_can_be_left_out() {
     use std::sync::Mutex;
 
-    use skylit::scene::load::{ImagesDecoded, LoadOptions, load_with};
+    use skylit::scene::load::{LoadOptions, LoadPart, LoadProgress, load_with};
 
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/courtyard.gltf");
     let whole = own("courtyard.gltf");
     let counted = Mutex::new(Vec::new());
-    let progress = |images: ImagesDecoded| counted.lock().unwrap().push(images);
+    let progress = |at: LoadProgress| counted.lock().unwrap().push(at);
     let again = load_with(source, &LoadOptions { progress: &progress, ..Default::default() }).unwrap();
     let n = counted.lock().unwrap().len();
     assert!(n > 0 && again.textures.len() == whole.textures.len() && again.report.skipped_images == 0);
-    assert!(counted.lock().unwrap().contains(&ImagesDecoded { done: n, of: Some(n) }), "{counted:?}");
+    assert!(
+        counted.lock().unwrap().contains(&LoadProgress { part: LoadPart::Images, done: n, of: Some(n) }),
+        "{counted:?}"
+    );
     let geometry = load_with(source, &LoadOptions { textures: false, ..Default::default() }).unwrap();
     assert_eq!((geometry.textures.len(), geometry.report.skipped_images), (0, n));
     assert!(geometry.materials.iter().all(|m| m.base_color_texture.is_none()));

@@ -28,6 +28,7 @@ mod oren_nayar;
 mod portals;
 mod scattering;
 mod shading_normals;
+mod texcoord_sets;
 mod texture_filter;
 mod transport;
 mod validation;

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::common::new_device;
-use glam::{Affine2, Vec4};
+use glam::{Affine2, Vec2, Vec4};
 use skylit::accel::features::SceneFeatures;
 use skylit::integrators::ao::{Attenuation, Hemisphere};
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
@@ -68,6 +68,7 @@ fn everything() -> Scene {
         mesh.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); mesh.positions.len()];
         mesh.clearcoat_tangents = vec![Vec4::new(0.0, 0.0, 1.0, -1.0); mesh.positions.len()];
         mesh.anisotropy_tangents = mesh.clearcoat_tangents.clone();
+        mesh.more_texcoords = vec![vec![Vec2::ZERO; mesh.positions.len()]];
     }
     for (geometry, material) in [
         (turned, textured),
@@ -176,6 +177,7 @@ fn gpu_kernels_of_all_features_are_valid() {
     let scene = everything();
     let features = SceneFeatures::from_flat(&FlatScene::for_paths(&scene));
     assert!(features.alpha && features.stochastic_alpha && features.spheres && features.deep_texels, "{features:?}");
+    assert!(features.many_texcoords, "{features:?}");
     holds(&tracers(&device), &scene, all_needs, &whole);
     // what excludes something of these, with as little else as there can be
     let little = scene_of(vec![(shapes::floor(DVec3::ZERO, 1.0), matte(0.5))], scene.cameras[0].clone());

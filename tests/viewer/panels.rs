@@ -6,6 +6,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
+use skylit::scene::load::{NormalSource, Projection, VertexOptions};
 use skylit::settings::Length;
 use skylit::viewer::app::{App, Arrangement, Second};
 use skylit::viewer::dialog::RenderedMotion;
@@ -718,6 +719,35 @@ fn variants_and_scenes_of_a_file_are_chosen() {
     alone.harness.run_steps(3);
     let request = alone.mailbox.peek();
     assert_eq!((request.gltf_scene, request.meaning.variant), (None, None));
+}
+
+/// Normals and texture coordinates are lists in the panel; either is for loading, and in the command that renders the view.
+#[test]
+fn normals_and_texture_coordinates_are_chosen() {
+    let mut alone = loaded();
+    alone.harness.run_steps(3);
+    alone.harness.get_all_by_label("Scene file").last().unwrap().click();
+    alone.harness.run_steps(10);
+    let choose = |alone: &mut Alone, list: &str, item: &str| {
+        alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, list).click();
+        alone.harness.run_steps(5);
+        alone.harness.get_all_by_label(item).last().unwrap().click();
+        alone.harness.run_steps(5);
+    };
+    choose(&mut alone, "Normals", "flat");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.vertices.normals, request.load), (NormalSource::Flat, 2));
+    choose(&mut alone, "Texture coordinates", "box");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.vertices.uv, request.load), (Some(Projection::Box), 3));
+    let command = alone.harness.state().command().unwrap();
+    assert!(command.contains(" --normals flat --uv box "), "{command}");
+
+    // the file's own again
+    choose(&mut alone, "Normals", "file");
+    choose(&mut alone, "Texture coordinates", "of the file");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.vertices, request.load), (VertexOptions::default(), 5));
 }
 
 /// Play at the end starts anew; Space shows one image of two.

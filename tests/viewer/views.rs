@@ -230,7 +230,7 @@ fn gpu_commands_reproduce_views() {
         let mut view = View::new(&mut session, &how, SIZE, &mut NoControl).unwrap();
         view.step(&session, &camera, Duration::from_micros(1), &mut NoControl).unwrap();
         let shown = view.values().unwrap().values;
-        let command = render_flags("builtin:stairs", &how, &cameras, &camera, SIZE);
+        let command = render_flags("builtin:stairs", session.scene(), &how, &camera, SIZE);
         assert!(command.starts_with("skylit render builtin:stairs -o ao.png --integrator ao"), "{command}");
         drop(session);
         let mut same = RenderSettings { camera: camera_settings(&cameras, &camera), ..how };

@@ -58,7 +58,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
 
     interrupt::install();
     let console = args.verbosity.console();
-    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     let about_file = FileWarnings::new(args, &renderer);
     let mut stills = renderer.still_sequence(&args.settings)?;
@@ -131,7 +131,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
-    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
     if args.files.background.is_some() && renderer.shows_environment(&args.settings)? {
@@ -200,7 +200,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     interrupt::install();
     let console = args.verbosity.console();
     let mut viewer = Viewer::connect(args, console)?;
-    let mut renderer = Renderer::open_with(&args.scene, &args.load.options(), &args.device)?;
+    let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
 

@@ -90,7 +90,8 @@ records! {
         normals: address,
         /// 2 floats per vertex of the submesh: texture coordinate set 0; 0: none.
         texcoords0: address,
-        /// 2 floats per vertex of the submesh: texture coordinate set 1; 0: none.
+        /// 2 floats per vertex of the submesh and set: texture coordinates from set 1 on, those of
+        /// a vertex side by side; 0: none.
         texcoords1: address,
         /// 4 floats per vertex of the submesh: vertex colours; 0: none.
         colors: address,
@@ -104,8 +105,9 @@ records! {
         scene_instance: uint,
         /// 1: the vertices were baked through a mirroring transform, which reversed their winding.
         mirrored: uint,
-        /// 1: spheres whose material has textures; their points have texture coordinates.
-        sphere_textures: uint,
+        /// Triangles: number of sets in `texcoords1`. Spheres: 1 if their material has textures, so
+        /// that their points have texture coordinates.
+        texcoord_sets: uint,
         /// 4 floats per vertex of the submesh: tangents; 0: required by no material.
         tangents: address,
         /// Tangents of the clearcoat's normal map, likewise; 0: `tangents`.
@@ -124,7 +126,7 @@ records! {
         texcoord_offset: vec2,
         /// Index of the base colour texture, or `INVALID`.
         base_color_texture: uint,
-        /// Texture coordinate set, 0 or 1.
+        /// Texture coordinate set.
         texcoord_set: uint,
         /// Alpha cutoff: hits with less alpha are ignored; negative: opaque.
         alpha_cutoff: float,

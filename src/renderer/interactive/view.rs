@@ -29,7 +29,7 @@ use crate::renderer::settings::CameraSettings;
 use crate::renderer::shell::quoted;
 use crate::renderer::still::camera_text;
 use crate::renderer::{RenderSettings, camera_numbers};
-use crate::scene::{Camera, ClipPlanes, Projection};
+use crate::scene::{Camera, ClipPlanes, Projection, Scene};
 use crate::tracer::MovedBounds;
 
 /// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second.
@@ -382,7 +382,7 @@ impl View {
             let pixels = aov::render(&traced.tracer, &record, self.size, control)?;
             image.channels.extend(aov::channels(&wanted, &pixels, origin));
             let name = files::portable_name(session.name);
-            let flags = render_flags(&name, &self.settings, &session.scene.cameras, camera, self.size);
+            let flags = render_flags(&name, session.scene, &self.settings, camera, self.size);
             image.metadata = camera_numbers::metadata(camera, aspect).map(|(k, v)| (k.to_owned(), v)).to_vec();
             image.metadata.extend([
                 ("camera".into(), camera_text(camera)),
@@ -454,24 +454,25 @@ impl StillView {
 }
 
 /// The command that renders what a view shows: `skylit render SCENE ...`, quoted for a shell.
-pub fn render_flags(
-    name: &str,
-    settings: &RenderSettings,
-    cameras: &[Camera],
-    camera: &Camera,
-    size: [u32; 2],
-) -> String {
+pub fn render_flags(name: &str, scene: &Scene, settings: &RenderSettings, camera: &Camera, size: [u32; 2]) -> String {
     let mut settings = settings.clone();
     settings.image.size = Some(size);
-    settings.camera = camera_settings(cameras, camera);
-    render_command(name, &settings)
+    settings.camera = camera_settings(&scene.cameras, camera);
+    render_command(name, &scene.report.options, &settings)
 }
 
 /// The command that renders a scene with these settings: `skylit render ...`, quoted for a shell.
-pub fn render_command(name: &str, settings: &RenderSettings) -> String {
+/// `load`: the options of loading it ([`crate::scene::load::LoadOptions::flags`]).
+pub fn render_command(name: &str, load: &[String], settings: &RenderSettings) -> String {
     let output = format!("{}.png", settings.integrator().name());
     let words = ["skylit".into(), "render".into(), name.to_owned(), "-o".into(), output];
-    words.into_iter().chain(settings.flags()).map(|w| quoted(&w)).collect::<Vec<_>>().join(" ")
+    words
+        .into_iter()
+        .chain(load.iter().cloned())
+        .chain(settings.flags())
+        .map(|w| quoted(&w))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// The settings that choose this camera: the name of one of the file's, or position, target, up

@@ -342,9 +342,9 @@ impl Writer {
         if !mesh.tangents.is_empty() && mesh.clearcoat_tangents.is_empty() && mesh.anisotropy_tangents.is_empty() {
             attributes["TANGENT"] = json!(self.floats(mesh.tangents.iter().map(|t| t.to_array()), false));
         }
-        for (key, set) in ["TEXCOORD_0", "TEXCOORD_1"].into_iter().zip(&mesh.texcoords) {
+        for (k, set) in mesh.texcoords.iter().chain(&mesh.more_texcoords).enumerate() {
             if !set.is_empty() {
-                attributes[key] = json!(self.floats(set.iter().map(|t| t.to_array()), false));
+                attributes[format!("TEXCOORD_{k}")] = json!(self.floats(set.iter().map(|t| t.to_array()), false));
             }
         }
         if !mesh.colors.is_empty() {

@@ -43,7 +43,7 @@ pub(super) fn compact(mesh: &mut TriangleMesh) -> Option<Vec<u32>> {
     keep(&mut mesh.normals, &index);
     keep(&mut mesh.tangents, &index);
     keep(&mut mesh.colors, &index);
-    for set in &mut mesh.texcoords {
+    for set in mesh.texcoord_sets_mut() {
         keep(set, &index);
     }
     Some((0..).zip(&index).filter(|(_, slot)| **slot != UNUSED).map(|(i, _)| i).collect())

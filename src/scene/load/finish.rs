@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::{Deformation, renumbered};
-use crate::scene::material::{VariantMaterials, all_variants};
+use crate::scene::material::all_variants;
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Smallest extent of a scene: below it products of lengths are lost in single precision, those of
@@ -99,25 +99,11 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
     Ok(())
 }
 
-/// Texture slots: transforms that are finite, and coordinates that are kept.
+/// Makes the transforms of texture slots finite.
 fn texture_slots(scene: &mut Scene) {
-    let mut is_used = vec![false; scene.materials.len()];
-    for mesh in &scene.meshes {
-        is_used[mesh.material] = true;
-        let variants = scene.materials[mesh.material].variants.iter();
-        variants.flat_map(VariantMaterials::all).for_each(|i| is_used[i] = true);
-    }
-    for (material, is_used) in scene.materials.iter_mut().zip(is_used) {
-        for slot in material.texture_slots_mut().into_iter().flatten() {
-            if !slot.transform.is_finite() {
-                slot.transform = glam::Affine2::IDENTITY;
-            }
-            // two sets of texture coordinates are kept; slots that use others get the first
-            if slot.texcoord > 1 {
-                let set = std::mem::take(&mut slot.texcoord);
-                let text = "a material uses more than two sets of texture coordinates: its first in place of set";
-                scene.report.warnings.extend(is_used.then(|| format!("{text} {set}")));
-            }
+    for slot in scene.materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
+        if !slot.transform.is_finite() {
+            slot.transform = glam::Affine2::IDENTITY;
         }
     }
 }
@@ -218,16 +204,16 @@ fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Def
 
     // texture coordinates and colours
     for (material, slot) in materials.iter().flat_map(|m| m.textures().map(move |slot| (m, slot))) {
-        let set = &mut triangles.texcoords[slot.texcoord];
-        if set.is_empty() {
+        if triangles.texcoord_set(slot.texcoord).is_empty() {
             let (number, name) = (slot.texcoord, &material.name);
             warn(format!(
                 "has no texture coordinates {number}, which textures of its material `{name}` use: taken as zero; --uv box (or spherical, cylindrical) makes some"
             ));
-            set.resize(triangles.positions.len(), glam::Vec2::ZERO);
+            let count = triangles.positions.len();
+            triangles.texcoord_set_mut(slot.texcoord).resize(count, glam::Vec2::ZERO);
         }
     }
-    let texcoords = triangles.texcoords.iter_mut().flatten();
+    let texcoords = triangles.texcoord_sets_mut().flatten();
     let bad: usize = texcoords.filter(|t| !t.is_finite()).map(|t| *t = glam::Vec2::ZERO).count();
     let bad_colors = triangles.colors.iter_mut().filter(|c| !c.is_finite()).map(|c| *c = glam::Vec4::ONE).count();
     if bad + bad_colors > 0 {
@@ -249,7 +235,9 @@ fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Def
         return notes;
     };
     if !tangents::normalize(triangles) {
-        if material.anisotropy.strength > 0.0 && !triangles.texcoords.iter().any(|set| tangents::varies(set)) {
+        if material.anisotropy.strength > 0.0
+            && !(0..triangles.texcoord_sets()).any(|set| tangents::varies(triangles.texcoord_set(set)))
+        {
             let text = "is anisotropic and has neither tangents nor texture coordinates: stretched around its y axis";
             notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
         }

@@ -1,5 +1,5 @@
-//! KTX2 images: Basis Universal (ETC1S, UASTC and their kin), ASTC, BC1 to BC5, BC7 and plain
-//! numbers, as they are or packed by Zstandard.
+//! KTX2 images: Basis Universal (ETC1S, UASTC and their kin), ASTC, BC1 to BC7 and plain numbers,
+//! as they are or packed by Zstandard.
 //!
 //! Only the largest level is read: levels are computed where a scene needs them.
 //!
@@ -8,10 +8,10 @@
 use std::io::Read;
 
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
-use exr::prelude::f16;
 use ktx2::{Format, Reader, SupercompressionScheme};
 
 use super::picture::{DecodedImage, MAX_SIDE};
+use super::texels::{Block, floats, half, single, unorm8, unorm16};
 use crate::memory::Budget;
 use crate::scene::TexelData;
 
@@ -134,89 +134,19 @@ impl Stored {
             Format::BC1_RGB_UNORM_BLOCK
             | Format::BC1_RGB_SRGB_BLOCK
             | Format::BC1_RGBA_UNORM_BLOCK
-            | Format::BC1_RGBA_SRGB_BLOCK => self.blocks(data, 8, 4, bcdec_rs::bc1),
-            Format::BC2_UNORM_BLOCK | Format::BC2_SRGB_BLOCK => self.blocks(data, 16, 4, bcdec_rs::bc2),
-            Format::BC3_UNORM_BLOCK | Format::BC3_SRGB_BLOCK => self.blocks(data, 16, 4, bcdec_rs::bc3),
-            Format::BC4_UNORM_BLOCK => self.blocks(data, 8, 1, |b, out, pitch| bcdec_rs::bc4(b, out, pitch, false)),
-            Format::BC5_UNORM_BLOCK => self.blocks(data, 16, 2, |b, out, pitch| bcdec_rs::bc5(b, out, pitch, false)),
-            Format::BC7_UNORM_BLOCK | Format::BC7_SRGB_BLOCK => self.blocks(data, 16, 4, bcdec_rs::bc7),
+            | Format::BC1_RGBA_SRGB_BLOCK => self.blocks(Block::Bc1, data),
+            Format::BC2_UNORM_BLOCK | Format::BC2_SRGB_BLOCK => self.blocks(Block::Bc2, data),
+            Format::BC3_UNORM_BLOCK | Format::BC3_SRGB_BLOCK => self.blocks(Block::Bc3, data),
+            Format::BC4_UNORM_BLOCK => self.blocks(Block::Bc4, data),
+            Format::BC5_UNORM_BLOCK => self.blocks(Block::Bc5, data),
+            Format::BC6H_UFLOAT_BLOCK => self.blocks(Block::Bc6h { signed: false }, data),
+            Format::BC6H_SFLOAT_BLOCK => self.blocks(Block::Bc6h { signed: true }, data),
+            Format::BC7_UNORM_BLOCK | Format::BC7_SRGB_BLOCK => self.blocks(Block::Bc7, data),
             other => Err(format!("has a format that skylit does not read (number {} of Vulkan's)", other.value())),
         }
     }
 
-    /// Decodes blocks of 4x4 pixels, each of `size` bytes; `decode` writes `channels` bytes a pixel
-    /// and takes the bytes of a row.
-    fn blocks(
-        &self,
-        data: &[u8],
-        size: usize,
-        channels: usize,
-        decode: impl Fn(&[u8], &mut [u8], usize),
-    ) -> Result<TexelData, String> {
-        let (columns, rows) = (self.width.div_ceil(4), self.height.div_ceil(4));
-        if data.len() < columns * rows * size {
-            return Err("ends early: it was cut off".to_owned());
-        }
-        let pitch = 4 * channels;
-        let mut pixels = vec![0; self.width * self.height * channels];
-        let mut block = [0; 64];
-        for (at, encoded) in data.chunks_exact(size).take(columns * rows).enumerate() {
-            decode(encoded, &mut block[..4 * pitch], pitch);
-
-            // blocks at the right and lower edge have pixels outside of the image
-            let (x, y) = (4 * (at % columns), 4 * (at / columns));
-            let bytes = channels * (self.width - x).min(4);
-            for row in 0..(self.height - y).min(4) {
-                let start = channels * ((y + row) * self.width + x);
-                pixels[start..start + bytes].copy_from_slice(&block[row * pitch..row * pitch + bytes]);
-            }
-        }
-        Ok(unorm8(&pixels, channels))
+    fn blocks(&self, block: Block, data: &[u8]) -> Result<TexelData, String> {
+        block.texels(data, [self.width, self.height])
     }
-}
-
-/// Texels with 8-bit channels, of which a pixel has 1 to 4.
-fn unorm8(data: &[u8], channels: usize) -> TexelData {
-    let texel = |pixel: &[u8]| {
-        let mut texel = [0, 0, 0, u8::MAX];
-        texel[..channels].copy_from_slice(pixel);
-        texel
-    };
-    data.chunks_exact(channels).flat_map(texel).collect::<Vec<u8>>().into()
-}
-
-/// Texels with 16-bit channels.
-fn unorm16(data: &[u8], channels: usize) -> TexelData {
-    let texel = |pixel: &[u8]| {
-        let mut texel = [0, 0, 0, u16::MAX];
-        for (channel, bytes) in texel.iter_mut().zip(pixel.as_chunks().0) {
-            *channel = u16::from_le_bytes(*bytes);
-        }
-        texel
-    };
-    data.chunks_exact(2 * channels).flat_map(texel).collect::<Vec<u16>>().into()
-}
-
-/// Texels with channels of `size` bytes, which `number` reads. What is not finite or negative would
-/// spoil every filtered value that includes it.
-fn floats(data: &[u8], size: usize, channels: usize, number: fn(&[u8]) -> f32) -> TexelData {
-    let texel = |pixel: &[u8]| {
-        let mut texel = [0.0, 0.0, 0.0, 1.0];
-        for (channel, bytes) in texel.iter_mut().zip(pixel.chunks_exact(size)) {
-            let value = number(bytes);
-            *channel = if value.is_finite() { value.max(0.0) } else { 0.0 };
-        }
-        texel
-    };
-    data.chunks_exact(size * channels).flat_map(texel).collect::<Vec<f32>>().into()
-}
-
-/// A half-precision number.
-fn half(bytes: &[u8]) -> f32 {
-    f16::from_le_bytes([bytes[0], bytes[1]]).to_f32()
-}
-
-/// A single-precision number.
-fn single(bytes: &[u8]) -> f32 {
-    f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
 }

@@ -5,6 +5,8 @@ mod brhan;
 mod camera_path;
 mod compact;
 pub mod confine;
+#[cfg(feature = "dds")]
+mod dds;
 mod environment;
 mod find;
 mod finish;
@@ -21,6 +23,8 @@ mod ranges;
 mod smoothing;
 mod split;
 mod tangents;
+#[cfg(any(feature = "dds", feature = "ktx2"))]
+mod texels;
 mod text;
 mod vertices;
 mod warnings;
@@ -30,7 +34,7 @@ use std::path::{Path, PathBuf};
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
-pub use options::{ImagesDecoded, LoadOptions, NormalSource, Projection, VertexOptions, is_in_progress};
+pub use options::{LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, VertexOptions, is_in_progress};
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;
@@ -64,6 +68,13 @@ pub fn load(source: &str) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let mut scene = load_any(source, options)?;
+    scene.report.options = options.flags();
+    Ok(scene)
+}
+
+/// Loads a file or a built-in scene.
+fn load_any(source: &str, options: &LoadOptions) -> Result<Scene> {
     let is_gltf = matches!(extension(Path::new(source)).as_str(), "gltf" | "glb");
     if let Some(scene) = options.scene.filter(|_| !is_gltf) {
         return Err(Error::Usage(format!("--gltf-scene {scene}: {source} is no glTF file, which may have several")));

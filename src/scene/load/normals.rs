@@ -53,10 +53,10 @@ pub(super) fn make_flat(mesh: &mut TriangleMesh) {
             *values = indices.iter().flatten().map(|&i| values[i as usize]).collect();
         }
     }
-    let indices = &mesh.indices;
+    let TriangleMesh { indices, texcoords, more_texcoords, .. } = mesh;
     expand(&mut mesh.positions, indices);
     expand(&mut mesh.colors, indices);
-    for set in &mut mesh.texcoords {
+    for set in texcoords.iter_mut().chain(more_texcoords) {
         expand(set, indices);
     }
     mesh.normals = mesh

@@ -1,5 +1,6 @@
 //! Options of loading, and the count of loads in progress.
 
+use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -33,6 +34,17 @@ pub enum NormalSource {
     Smooth(f64),
 }
 
+impl fmt::Display for NormalSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => f.write_str("file"),
+            Self::Flat => f.write_str("flat"),
+            Self::Smooth(degrees) if *degrees == 180.0 => f.write_str("smooth"),
+            Self::Smooth(degrees) => write!(f, "{degrees}"),
+        }
+    }
+}
+
 impl FromStr for NormalSource {
     type Err = String;
 
@@ -59,14 +71,24 @@ pub struct VertexOptions {
     pub uv: Option<Projection>,
 }
 
+impl VertexOptions {
+    /// The options as words of the command line: `--normals`, `flat`, ...; none of the defaults.
+    pub fn flags(&self) -> Vec<String> {
+        let normals = Some(self.normals).filter(|n| *n != NormalSource::File);
+        let normals = normals.map(|normals| ["--normals".to_owned(), normals.to_string()]);
+        let uv = self.uv.map(|projection| ["--uv".to_owned(), projection.to_string()]);
+        normals.into_iter().chain(uv).flatten().collect()
+    }
+}
+
 /// Options of loading a scene.
 #[derive(Clone, Copy)]
 pub struct LoadOptions<'a> {
     /// Whether images are decoded. Without them materials have no textures, and
     /// [`crate::scene::LoadReport::skipped_images`] says what was left out.
     pub textures: bool,
-    /// Called after each image that was decoded, from several threads.
-    pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
+    /// Called after each part that was decoded, from several threads.
+    pub progress: &'a (dyn Fn(LoadProgress) + Sync),
     /// Where the files that a scene refers to have to lie. Those elsewhere are an error, and are
     /// not opened.
     pub confine: Confine<'a>,
@@ -77,12 +99,32 @@ pub struct LoadOptions<'a> {
     pub vertices: VertexOptions,
 }
 
-/// Images decoded so far.
+impl LoadOptions<'_> {
+    /// The options that decide what is loaded, as words of the command line: `--gltf-scene`,
+    /// `--normals`, `--uv`; none of the defaults.
+    pub fn flags(&self) -> Vec<String> {
+        let scene = self.scene.map(|scene| ["--gltf-scene".to_owned(), scene.to_owned()]);
+        scene.into_iter().flatten().chain(self.vertices.flags()).collect()
+    }
+}
+
+/// A kind of parts that are decoded while a scene is loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ImagesDecoded {
-    /// Number of images that are decoded.
+pub enum LoadPart {
+    /// Compressed geometry: views and primitives.
+    Geometry,
+    /// Images.
+    Images,
+}
+
+/// How much of a scene is decoded so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoadProgress {
+    /// Kind of the parts that are counted.
+    pub part: LoadPart,
+    /// Number of those that are decoded.
     pub done: usize,
-    /// Number of all images; `None` for an .obj, of which it is not known before.
+    /// Number of all; `None` for images of an .obj, which is not known before.
     pub of: Option<usize>,
 }
 

@@ -7,6 +7,8 @@ use crate::memory::Budget;
 use crate::output::decode::{self, MaxSize};
 use crate::output::radiance::{self, RadianceImage};
 use crate::scene::TexelData;
+#[cfg(feature = "dds")]
+use crate::scene::load::dds;
 #[cfg(feature = "ktx2")]
 use crate::scene::load::ktx2;
 
@@ -44,6 +46,10 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
     if ktx2::is_ktx2(bytes) {
         return ktx2::decode(bytes, budget);
     }
+    #[cfg(feature = "dds")]
+    if dds::is_dds(bytes) {
+        return dds::decode(bytes, budget);
+    }
     if radiance::is_radiance(bytes) {
         let RadianceImage { width, height, rgb } = radiance::decode(bytes.to_vec(), MAX_SIDE, budget)?;
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
@@ -53,9 +59,9 @@ pub(super) fn decode(bytes: &[u8], name: &str, budget: &Budget) -> Result<Decode
     }
 
     // the others, whose size is checked before they are decoded
-    let format = image::guess_format(bytes)
-        .or_else(|_| ImageFormat::from_path(name))
-        .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, WebP, KTX2, TGA and BMP are)".to_owned())?;
+    let format = image::guess_format(bytes).or_else(|_| ImageFormat::from_path(name)).map_err(|_| {
+        "is of a format that skylit does not read (PNG, JPEG, WebP, KTX2, DDS, TGA and BMP are)".to_owned()
+    })?;
     // a one-bit PNG packs at most 8 * 1032 pixels into a byte, every other format fewer
     let max = MaxSize { side: MAX_SIDE, pixels_per_byte: Some(10_000), budget, pixel_bytes: texel_bytes };
     let pixels = decode::decode(bytes, format, max)?;

@@ -11,9 +11,9 @@ use super::options::Projection;
 use super::split::{Split, split};
 use crate::scene::TriangleMesh;
 
-/// Gives the sets of texture coordinates for which `wanted` is true the projection of the mesh onto
-/// the shape, and copies vertices where it has a seam. Returns which vertex each vertex was before.
-pub(super) fn project(mesh: &mut TriangleMesh, projection: Projection, wanted: [bool; 2]) -> Vec<u32> {
+/// Gives the `wanted` sets of texture coordinates the projection of the mesh onto the shape, and
+/// copies vertices where it has a seam. Returns which vertex each vertex was before.
+pub(super) fn project(mesh: &mut TriangleMesh, projection: Projection, wanted: &[usize]) -> Vec<u32> {
     let used = || mesh.indices.iter().flatten().map(|&i| mesh.positions[i as usize]);
     let [lo, hi] = used().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], p| [lo.min(p), hi.max(p)]);
     let (centre, extent) = (0.5 * lo + 0.5 * hi, (hi - lo).max(Vec3::splat(f32::MIN_POSITIVE)));
@@ -38,8 +38,8 @@ pub(super) fn project(mesh: &mut TriangleMesh, projection: Projection, wanted: [
     let Split { source, keys } = split(mesh, |corner| corners[corner]);
     let texcoords: Vec<Vec2> =
         keys.into_iter().map(|key| key.map_or(Vec2::ZERO, |bits| Vec2::from_array(bits.map(f32::from_bits)))).collect();
-    for (set, _) in mesh.texcoords.iter_mut().zip(wanted).filter(|(_, wanted)| *wanted) {
-        set.clone_from(&texcoords);
+    for &set in wanted {
+        mesh.texcoord_set_mut(set).clone_from(&texcoords);
     }
     source
 }

@@ -46,7 +46,7 @@ pub(super) fn split<K: Copy + Eq + Hash>(mesh: &mut TriangleMesh, mut key: impl 
     extend(&mut mesh.positions, copies);
     extend(&mut mesh.normals, copies);
     extend(&mut mesh.colors, copies);
-    for set in &mut mesh.texcoords {
+    for set in mesh.texcoord_sets_mut() {
         extend(set, copies);
     }
     drop_tangents(mesh);

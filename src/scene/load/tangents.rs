@@ -70,8 +70,8 @@ pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> 
 fn corner_tangents(mesh: &TriangleMesh, texture: Option<TextureSlot>) -> Vec<Vec4> {
     let own =
         texture.map(|t| (t.texcoord, t.transform)).filter(|(_, transform)| transform.matrix2.determinant() != 0.0);
-    let candidates = own.into_iter().chain([0, 1].map(|set| (set, Affine2::IDENTITY)));
-    let chosen = candidates.into_iter().find(|(set, _)| varies(&mesh.texcoords[*set]));
+    let candidates = own.into_iter().chain((0..mesh.texcoord_sets()).map(|set| (set, Affine2::IDENTITY)));
+    let chosen = candidates.into_iter().find(|(set, _)| varies(mesh.texcoord_set(*set)));
     let (set, transform) = chosen.unwrap_or_default();
     let mut corners = Corners { mesh, set, transform, faces: None, tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
     if chosen.is_some() {
@@ -141,7 +141,7 @@ impl Corners<'_> {
     /// Without negative zeros, which are other bits of the same number.
     fn texcoord(&self, vertex: usize) -> [f32; 2] {
         // glTF's v points down, the algorithm's up; the sign of the bitangent depends on it
-        let uv = self.transform.transform_point2(self.mesh.texcoords[self.set][vertex]);
+        let uv = self.transform.transform_point2(self.mesh.texcoord_set(self.set)[vertex]);
         [uv.x + 0.0, 1.0 - uv.y]
     }
 
@@ -444,7 +444,7 @@ fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
     extend(&mut mesh.positions, &copies);
     extend(&mut mesh.normals, &copies);
     extend(&mut mesh.colors, &copies);
-    for set in &mut mesh.texcoords {
+    for set in mesh.texcoord_sets_mut() {
         extend(set, &copies);
     }
     // vertices that no triangle uses

@@ -1,6 +1,6 @@
 //! Normals and texture coordinates that options ask for in place of the file's, or of none.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use glam::DAffine3;
 use rayon::prelude::*;
@@ -41,11 +41,11 @@ pub(super) fn apply(scene: &mut Scene, options: VertexOptions, budget: &Budget) 
     budget.check()?;
     replace_normals(scene, options.normals);
     if let Some(projection) = options.uv {
-        let missing: Vec<[bool; 2]> = (0..scene.meshes.len()).map(|i| missing_sets(scene, i)).collect();
-        scene.report.texcoords_projected = missing.iter().filter(|sets| **sets != [false; 2]).count();
+        let missing: Vec<Vec<usize>> = (0..scene.meshes.len()).map(|i| missing_sets(scene, i)).collect();
+        scene.report.texcoords_projected = missing.iter().filter(|sets| !sets.is_empty()).count();
         parts(scene).into_par_iter().zip(missing).for_each(|(part, missing)| {
-            let Some((mesh, deformation)) = part.filter(|_| missing != [false; 2]) else { return };
-            let source = project(mesh, projection, missing);
+            let Some((mesh, deformation)) = part.filter(|_| !missing.is_empty()) else { return };
+            let source = project(mesh, projection, &missing);
             deformation.into_iter().for_each(|d| d.reorder(&source));
         });
     }
@@ -124,13 +124,10 @@ fn surfaces(scene: &Scene) -> Vec<usize> {
 }
 
 /// The sets of texture coordinates that textures of a mesh's materials use and the mesh lacks.
-fn missing_sets(scene: &Scene, mesh: usize) -> [bool; 2] {
-    let mut missing = [false; 2];
+fn missing_sets(scene: &Scene, mesh: usize) -> Vec<usize> {
     let mesh = &scene.meshes[mesh];
-    if let Geometry::Triangles(triangles) = &mesh.geometry {
-        for slot in all_variants(&scene.materials, mesh.material).iter().flat_map(|m| m.textures()) {
-            missing[slot.texcoord] = triangles.texcoords[slot.texcoord].is_empty();
-        }
-    }
-    missing
+    let Geometry::Triangles(triangles) = &mesh.geometry else { return Vec::new() };
+    let used = all_variants(&scene.materials, mesh.material).into_iter().flat_map(|m| m.textures());
+    let sets: BTreeSet<usize> = used.map(|slot| slot.texcoord).collect();
+    sets.into_iter().filter(|set| triangles.texcoord_set(*set).is_empty()).collect()
 }

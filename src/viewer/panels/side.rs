@@ -6,6 +6,7 @@ use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::Camera;
 use crate::scene::environments::BuiltinEnvironment;
+use crate::scene::load::{NormalSource, Projection, VertexOptions};
 use crate::scene::settings::variant_index;
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
@@ -33,6 +34,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
         editor::edit(ui, settings, &serde_json::json!({ "mtl_dissolve": "alpha" }));
         variant(app, ui);
         scene_of_file(app, ui);
+        vertices(app, ui);
     });
     section(ui, "Light", false, |ui| light(app, ui));
     section(ui, "Camera", false, |ui| camera(app, ui));
@@ -534,6 +536,54 @@ fn scene_of_file(app: &mut App, ui: &mut Ui) {
     });
     if chosen.is_some() {
         app.gltf_scene = chosen;
+        app.reload();
+    }
+}
+
+/// Normals and texture coordinates that replace the file's, for which it is loaded anew.
+fn vertices(app: &mut App, ui: &mut Ui) {
+    let mut is_editing = false;
+    let VertexOptions { normals, uv } = &mut app.vertices;
+
+    // normals, and the angle of edges that stay sharp
+    let angle = if let NormalSource::Smooth(degrees) = *normals { degrees } else { 180.0 };
+    let sources = [("file", NormalSource::File), ("flat", NormalSource::Flat), ("smooth", NormalSource::Smooth(angle))];
+    let shown = sources.iter().find(|(_, source)| *source == *normals).map_or("file", |(name, _)| *name);
+    ui.horizontal(|ui| {
+        let heading = ui.label("Normals");
+        let combo = ComboBox::from_id_salt("normals").selected_text(shown);
+        let response = combo.show_ui(ui, |ui| {
+            for (name, source) in sources {
+                ui.selectable_value(normals, source, name);
+            }
+        });
+        response.response.labelled_by(heading.id).on_hover_text("Shading normals of all meshes\n--normals");
+    });
+    if let NormalSource::Smooth(degrees) = normals {
+        ui.horizontal(|ui| {
+            let heading = ui.label("Sharp edges from");
+            let value = egui::DragValue::new(degrees).range(0.0..=180.0).suffix(" degrees");
+            let help = "Edges at which the surface bends by more stay sharp\n--normals ANGLE";
+            let response = ui.add(value).labelled_by(heading.id).on_hover_text(help);
+            is_editing = response.dragged() || response.has_focus();
+        });
+    }
+
+    // texture coordinates
+    ui.horizontal(|ui| {
+        let heading = ui.label("Texture coordinates");
+        let combo = ComboBox::from_id_salt("uv").selected_text(uv.map_or("of the file", |p| p.name()));
+        let response = combo.show_ui(ui, |ui| {
+            ui.selectable_value(uv, None, "of the file");
+            for projection in Projection::ALL {
+                ui.selectable_value(uv, Some(projection), projection.name()).on_hover_text(projection.help());
+            }
+        });
+        let help = "Texture coordinates of meshes that have none and whose material has textures\n--uv";
+        response.response.labelled_by(heading.id).on_hover_text(help);
+    });
+    // not for each value that is passed on the way
+    if app.vertices != app.opened_vertices() && !is_editing {
         app.reload();
     }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::load::{self, ImagesDecoded, LoadOptions};
+use crate::scene::load::{self, LoadOptions, LoadPart, LoadProgress};
 use crate::viewer::request::{Event, EventSender, Mailbox};
 
 /// Scene or images that have been loaded.
@@ -128,11 +128,15 @@ impl Job {
 
     fn load(&self, textures: bool) -> Result<Scene> {
         let name = Path::new(&self.source).file_name().unwrap_or_default().to_string_lossy();
-        let progress = |images: ImagesDecoded| {
+        let progress = |at: LoadProgress| {
             if !self.is_cancelled.load(Ordering::Relaxed) {
-                let total = images.of.map_or_else(String::new, |n| format!(" of {n}"));
-                let share = images.of.map(|n| images.done as f32 / n.max(1) as f32);
-                self.events.send(Event::Loading(format!("loading {name}: {}{total} images", images.done), share));
+                let total = at.of.map_or_else(String::new, |n| format!(" of {n}"));
+                let share = at.of.map(|n| at.done as f32 / n.max(1) as f32);
+                let what = match at.part {
+                    LoadPart::Geometry => "parts of its geometry",
+                    LoadPart::Images => "images",
+                };
+                self.events.send(Event::Loading(format!("loading {name}: {}{total} {what}", at.done), share));
             }
         };
         load::load_with(

@@ -172,7 +172,8 @@ impl Worker {
         request: &Request,
         device: Option<Arc<Device>>,
     ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
-        let mut loader = Loader::start(source, request.gltf_scene.as_deref(), self.load, &self.mailbox, &self.events)?;
+        let options = LoadOptions { vertices: request.vertices, ..self.load };
+        let mut loader = Loader::start(source, request.gltf_scene.as_deref(), options, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),
             None => Device::open(&request.device.options()),

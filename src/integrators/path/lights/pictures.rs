@@ -100,7 +100,7 @@ impl<'s> Picture<'s> {
     /// The parts of a triangle, or none if it had better be sampled as a whole. `whole`: brightness
     /// of the mean radiance of all triangles.
     fn parts(&self, triangle: usize, side: u32, whole: f64) -> Vec<Part> {
-        let coordinates = self.mesh.texcoords.get(self.slot.texcoord).filter(|c| !c.is_empty());
+        let coordinates = Some(self.mesh.texcoord_set(self.slot.texcoord)).filter(|c| !c.is_empty());
         let Some(coordinates) = coordinates.filter(|_| side > 1 && !self.texture.texels.is_empty()) else {
             return Vec::new();
         };

@@ -19,7 +19,7 @@ pub(super) fn read(
     reader: &Reader,
     primitive: &Primitive,
     tangents: bool,
-    sets: [u32; 2],
+    sets: &[u32],
     warn: &mut dyn FnMut(String),
 ) -> Result<Option<TriangleMesh>, String> {
     let mode = match valid(primitive.mode) {
@@ -68,9 +68,9 @@ pub(super) fn read(
     if let Some(a) = attribute(Semantic::Tangents).filter(|_| tangents && !mesh.normals.is_empty()) {
         mesh.tangents = reader.floats(same_count(a)?, Type::Vec4, Vec4::from_array)?;
     }
-    for (set, texcoords) in sets.into_iter().zip(&mut mesh.texcoords) {
-        if let Some(a) = attribute(Semantic::TexCoords(set)) {
-            *texcoords = reader.floats(same_count(a)?, Type::Vec2, Vec2::from_array)?;
+    for (k, set) in sets.iter().enumerate() {
+        if let Some(a) = attribute(Semantic::TexCoords(*set)) {
+            *mesh.texcoord_set_mut(k) = reader.floats(same_count(a)?, Type::Vec2, Vec2::from_array)?;
         }
     }
     if let Some(a) = attribute(Semantic::Colors(0)) {

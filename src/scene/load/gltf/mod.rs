@@ -77,6 +77,7 @@ const KNOWN: &[(&str, bool)] = &[
     ("KHR_texture_basisu", cfg!(feature = "ktx2")),
     ("KHR_texture_transform", true),
     ("KHR_xmp_json_ld", true),
+    ("MSFT_texture_dds", cfg!(feature = "dds")),
 ];
 
 /// Reads a `.gltf` or `.glb` file.
@@ -92,7 +93,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     scene.report.files = container::files(&document, path, loading.options.confine.folder())?;
     let buffers = container::buffers(&document, chunks.bin, path, loading);
     let stored = Reader { document: &document, buffers: &buffers, decoded: &Decoded::default(), budget };
-    let decoded = compressed::decode(&stored);
+    let decoded = compressed::decode(&stored, loading.options.progress);
     let reader = Reader { decoded: &decoded, ..stored };
     let input = |e| Error::input(path, e);
     let chosen = node::choose_scene(&document, loading.options.scene).map_err(input)?;
@@ -213,7 +214,7 @@ struct Meshes<'a> {
     /// The scene's materials that depend on its variant.
     varied: Vec<usize>,
     /// Materials for other sets of texture coordinates than the first two.
-    with_sets: BTreeMap<(usize, [u32; 2]), usize>,
+    with_sets: BTreeMap<(usize, Vec<u32>), usize>,
 }
 
 /// A mesh of the scene.
@@ -270,13 +271,13 @@ impl Meshes<'_> {
             let variants = variants::materials(primitive, material, scene.variants.len(), known).map_err(input)?;
             let mut variants = variants.unwrap_or(VariantMaterials { base: material, replacements: Vec::new() });
             let sets = texcoord_sets(variants.all().map(|i| &scene.materials[i]));
-            variants.all_mut().for_each(|i| *i = self.with_sets(*i, sets, scene));
+            variants.all_mut().for_each(|i| *i = self.with_sets(*i, &sets, scene));
             let material =
                 if variants.replacements.is_empty() { variants.base } else { self.varied_material(variants, scene) };
 
             // the primitive, with what deforms it
             let tangents = all_variants(&scene.materials, material).iter().any(|m| m.needs_tangents());
-            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, sets, &mut warn).map_err(input)?
+            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &sets, &mut warn).map_err(input)?
             else {
                 continue;
             };
@@ -294,17 +295,16 @@ impl Meshes<'_> {
         Ok(made)
     }
 
-    /// Index of a material whose slots count these sets of texture coordinates as the first two.
-    fn with_sets(&mut self, material: usize, sets: [u32; 2], scene: &mut Scene) -> usize {
+    /// Index of a material whose slots count these sets of texture coordinates as the first ones.
+    fn with_sets(&mut self, material: usize, sets: &[u32], scene: &mut Scene) -> usize {
         if sets == [0, 1] {
             return material;
         }
-        *self.with_sets.entry((material, sets)).or_insert_with(|| {
+        *self.with_sets.entry((material, sets.to_vec())).or_insert_with(|| {
             let mut renumbered = scene.materials[material].clone();
             for slot in renumbered.texture_slots_mut().into_iter().flatten() {
-                // a third set stays what it is, and is refused
                 let place = sets.iter().position(|set| *set as usize == slot.texcoord);
-                slot.texcoord = place.unwrap_or(slot.texcoord);
+                slot.texcoord = place.unwrap_or_default();
             }
             scene.materials.push(renumbered);
             scene.materials.len() - 1
@@ -325,18 +325,11 @@ impl Meshes<'_> {
     }
 }
 
-/// The two sets of texture coordinates that a primitive keeps: the first two that its materials
-/// use.
-fn texcoord_sets<'a>(materials: impl Iterator<Item = &'a Material>) -> [u32; 2] {
+/// The sets of texture coordinates that a primitive keeps: the first two, or those that its
+/// materials use if there is another one among them.
+fn texcoord_sets<'a>(materials: impl Iterator<Item = &'a Material>) -> Vec<u32> {
     let used: BTreeSet<u32> = materials.flat_map(Material::textures).map(|slot| slot.texcoord as u32).collect();
-    let mut used = used.into_iter();
-    match [used.next(), used.next()] {
-        [None | Some(0 | 1), None | Some(0 | 1)] => [0, 1],
-        [first, second] => {
-            let first = first.unwrap_or(0);
-            [first, second.unwrap_or(first + 1)]
-        }
-    }
+    if used.iter().all(|set| *set <= 1) { vec![0, 1] } else { used.into_iter().collect() }
 }
 
 #[cfg(test)]

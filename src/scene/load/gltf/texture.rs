@@ -13,7 +13,7 @@ use super::accessor::Reader;
 use super::glossiness::RoughnessTexture;
 use super::values::{text, valid};
 use super::{container, uri};
-use crate::scene::load::options::{ImagesDecoded, Loading};
+use crate::scene::load::options::{LoadPart, LoadProgress, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
@@ -59,7 +59,8 @@ pub(super) fn resolve(
     let (count, done) = (wanted.len(), AtomicUsize::new(0));
     let decode = |i: usize| {
         let decoded = image(reader, path, loading, i);
-        (options.progress)(ImagesDecoded { done: 1 + done.fetch_add(1, Ordering::Relaxed), of: Some(count) });
+        let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+        (options.progress)(LoadProgress { part: LoadPart::Images, done, of: Some(count) });
         (i, decoded)
     };
     let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
@@ -110,7 +111,11 @@ pub(super) fn resolve(
 }
 
 /// Extensions by which a texture has an image of another format than PNG and JPEG.
-const SOURCES: &[(&str, bool)] = &[("KHR_texture_basisu", cfg!(feature = "ktx2")), ("EXT_texture_webp", true)];
+const SOURCES: &[(&str, bool)] = &[
+    ("KHR_texture_basisu", cfg!(feature = "ktx2")),
+    ("MSFT_texture_dds", cfg!(feature = "dds")),
+    ("EXT_texture_webp", true),
+];
 
 /// Index of a texture's image. One of an extension comes first, as these want it: what stands
 /// beside it is for programs without them.

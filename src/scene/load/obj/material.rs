@@ -80,6 +80,8 @@ impl<'a> MaterialLibrary<'a> {
             warnings.push(format!("{file}: `Tr 1` would hide every material: taken for a copy of `d`, opaque"));
             parsed.iter_mut().for_each(|m| m.transparency = None);
         }
+        self.textures.decode_ahead(parsed.iter().flat_map(MtlMaterial::colour_and_surface_maps), [mtl, obj]);
+
         // of two with one name in a file the last counts, in two files the first
         let mut own: HashMap<String, usize> = HashMap::new();
         for material in parsed {

@@ -103,6 +103,16 @@ pub(super) struct MtlMaterial {
     pub parameters: BTreeMap<String, f32>,
 }
 
+impl MtlMaterial {
+    /// The maps that every material shows, whatever else it has.
+    pub(super) fn colour_and_surface_maps(&self) -> impl Iterator<Item = &Map> {
+        let normal = self.map_normal.as_ref().or(self.map_bump.as_ref());
+        let surface = [&self.map_roughness, &self.map_metallic];
+        let colours = [&self.map_diffuse, &self.map_dissolve, &self.map_emissive];
+        colours.into_iter().chain(surface).flatten().chain(normal)
+    }
+}
+
 /// Numbers of [`MtlMaterial::parameters`] that have a meaning here: layers, and the roughness of
 /// Oren-Nayar's model.
 const PARAMETERS: [&str; 6] = ["Pc", "Pcr", "Ps", "aniso", "anisor", "sigma"];
@@ -366,11 +376,16 @@ mod tests {
         let m = parse("newmtl a\nKd 1 2\nKs 0.5\nd nan\nillum x", &mut |w| warnings.push(w));
         assert_eq!((m.len(), warnings.len(), m[0].specular), (1, 3, Some(Vec3::splat(0.5))), "{warnings:?}");
         let mut warnings = Vec::new();
-        let text = "newmtl a\rKD 1 0,5 0 # red\rmap_Xs s.png\rdisp h.png\rmap_aat on\r#map_Xs\rKa 1 0 0\rPC 0.5";
+        let text = "newmtl a\rKD 1 0,5 0 # red\rmap_Xs s.png\rdisp h.png\rmap_aat on\r#map_Xs\rKa 1 0 0\rPC 0.5\r\
+                    map_anisor a.png\rDecal d.png\ranisor 0.25";
         let m = parse(text, &mut |w| warnings.push(w));
         assert_eq!(m[0].diffuse, Some(Vec3::new(1.0, 0.5, 0.0)));
         assert_eq!(m[0].parameters.get("Pc"), Some(&0.5));
-        assert_eq!(warnings, ["line 3: map_Xs is not used", "line 4: disp is not used"]);
+        // of anisotropy the angle is read, and not from a map
+        assert_eq!(m[0].parameters.get("anisor"), Some(&0.25));
+        let unused = [(3, "map_Xs"), (4, "disp"), (9, "map_anisor"), (10, "Decal")]
+            .map(|(n, key)| format!("line {n}: {key} is not used"));
+        assert_eq!(warnings, unused);
     }
 
     /// Statements and options without an effect are named, unless they say what is so anyway.

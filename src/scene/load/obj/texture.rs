@@ -2,14 +2,16 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::mtl::{Map, MapChannel};
 use crate::colour::srgb_encode;
 use crate::error::Error;
 use crate::scene::load::find::{self, Finder};
-use crate::scene::load::options::{ImagesDecoded, Loading};
+use crate::scene::load::options::{LoadPart, LoadProgress, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::load::text;
 use crate::scene::material::TextureSlot;
@@ -46,6 +48,10 @@ pub(super) struct Textures<'a> {
     loading: Loading<'a>,
     pub finder: Finder,
     pictures: HashMap<PathBuf, Option<DecodedImage>>,
+    /// Pictures that were decoded before a material asks for them.
+    ahead: HashMap<PathBuf, Result<DecodedImage, String>>,
+    /// Number of pictures that were decoded.
+    decoded: AtomicUsize,
     textures: HashMap<TextureKey, usize>,
     /// Names that were not found.
     missing: HashSet<String>,
@@ -54,8 +60,29 @@ pub(super) struct Textures<'a> {
 impl<'a> Textures<'a> {
     /// No texture yet.
     pub(super) fn new(loading: Loading<'a>) -> Self {
-        let (pictures, textures) = (HashMap::new(), HashMap::new());
-        Self { loading, finder: Finder::new(&loading.options), pictures, textures, missing: HashSet::new() }
+        Self {
+            loading,
+            finder: Finder::new(&loading.options),
+            pictures: HashMap::new(),
+            ahead: HashMap::new(),
+            decoded: AtomicUsize::new(0),
+            textures: HashMap::new(),
+            missing: HashSet::new(),
+        }
+    }
+
+    /// Decodes the pictures of maps on all cores, as far as they are found; materials take them
+    /// then, in their order, and say what is wrong with them.
+    pub(super) fn decode_ahead<'m>(&mut self, maps: impl Iterator<Item = &'m Map>, beside: [&Path; 2]) {
+        if !self.loading.options.textures {
+            return;
+        }
+        let mut paths: Vec<PathBuf> = maps.filter_map(|map| self.finder.find(&map.names(), &beside).ok()).collect();
+        paths.sort();
+        paths.dedup();
+        paths.retain(|path| !self.pictures.contains_key(path));
+        let decoded: Vec<_> = paths.par_iter().map(|path| self.decode_file(path)).collect();
+        self.ahead.extend(paths.into_iter().zip(decoded));
     }
 
     /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can
@@ -232,20 +259,26 @@ impl<'a> Textures<'a> {
         }
         report.files.push(path.to_owned());
         let picture = if self.loading.options.textures {
-            let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e).to_string());
-            let name = path.to_string_lossy();
-            let budget = self.loading.budget;
-            let decoded = bytes.and_then(|b| {
-                budget.read(b.len());
-                picture::decode(&b, &name, budget).map_err(|e| format!("{name} {e}"))
-            });
-            (self.loading.options.progress)(ImagesDecoded { done: self.pictures.len() + 1, of: None });
+            let decoded = self.ahead.remove(path).unwrap_or_else(|| self.decode_file(path));
             decoded.map_err(|e| report.warnings.push(format!("{e}: shown without it"))).ok()
         } else {
             report.skipped_images += 1;
             None
         };
         self.pictures.insert(path.to_owned(), picture);
+    }
+
+    fn decode_file(&self, path: &Path) -> Result<DecodedImage, String> {
+        let bytes = crate::files::read_regular(path).map_err(|e| Error::read(path, &e).to_string());
+        let name = path.to_string_lossy();
+        let budget = self.loading.budget;
+        let decoded = bytes.and_then(|b| {
+            budget.read(b.len());
+            picture::decode(&b, &name, budget).map_err(|e| format!("{name} {e}"))
+        });
+        let done = 1 + self.decoded.fetch_add(1, Ordering::Relaxed);
+        (self.loading.options.progress)(LoadProgress { part: LoadPart::Images, done, of: None });
+        decoded
     }
 }
 

@@ -10,6 +10,8 @@ mod elements;
 mod meshopt;
 
 use std::collections::{BTreeMap, BTreeSet};
+#[cfg(any(feature = "draco", feature = "meshopt"))]
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ::gltf::json::Root;
 use ::gltf::json::mesh::Primitive;
@@ -21,46 +23,65 @@ pub(super) use meshopt::{EXTENSIONS as MESHOPT, buffer_of_view};
 
 use super::accessor::Reader;
 use super::decoded::{Decoded, DecodedElements};
+#[cfg(any(feature = "draco", feature = "meshopt"))]
+use crate::scene::load::options::LoadPart;
+use crate::scene::load::options::LoadProgress;
 
 /// The extension of primitives.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
+/// Hears of parts that were decoded.
+type Listener<'a> = &'a (dyn Fn(LoadProgress) + Sync);
+
 /// Decodes what is compressed in a file. `reader` has nothing decoded yet.
-pub(super) fn decode(reader: &Reader) -> Decoded {
-    let views = decode_views(reader);
+pub(super) fn decode(reader: &Reader, progress: Listener) -> Decoded {
+    let views = decode_views(reader, progress);
     let mut decoded = Decoded { views, accessors: BTreeMap::new() };
 
     // Draco's streams may lie in views that were compressed again
-    decoded.accessors = decode_primitives(&Reader { decoded: &decoded, ..*reader });
+    decoded.accessors = decode_primitives(&Reader { decoded: &decoded, ..*reader }, progress);
     decoded
 }
 
+/// Decodes all of these on all cores, and says so after each.
+#[cfg(any(feature = "draco", feature = "meshopt"))]
+fn decode_all<T: Sync, R: Send>(all: &[T], decode: impl Fn(&T) -> R + Sync, progress: Listener) -> Vec<R> {
+    let done = AtomicUsize::new(0);
+    let counted = |part: &T| {
+        let decoded = decode(part);
+        let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+        progress(LoadProgress { part: LoadPart::Geometry, done, of: Some(all.len()) });
+        decoded
+    };
+    all.par_iter().map(counted).collect()
+}
+
 #[cfg(not(feature = "meshopt"))]
-fn decode_views(_: &Reader) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+fn decode_views(_: &Reader, _: Listener) -> BTreeMap<usize, Result<Vec<u8>, String>> {
     BTreeMap::new()
 }
 
 /// Decodes buffer views that meshoptimizer packed.
 #[cfg(feature = "meshopt")]
-fn decode_views(reader: &Reader) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+fn decode_views(reader: &Reader, progress: Listener) -> BTreeMap<usize, Result<Vec<u8>, String>> {
     let is_compressed = |&i: &usize| meshopt::is_compressed(reader.document, i);
     let compressed: Vec<usize> = (0..reader.document.buffer_views.len()).filter(is_compressed).collect();
-    compressed.into_par_iter().map(|i| (i, elements::decode(reader, i))).collect()
+    decode_all(&compressed, |&i| (i, elements::decode(reader, i)), progress).into_iter().collect()
 }
 
 #[cfg(not(feature = "draco"))]
-fn decode_primitives(_: &Reader) -> BTreeMap<usize, Result<DecodedElements, String>> {
+fn decode_primitives(_: &Reader, _: Listener) -> BTreeMap<usize, Result<DecodedElements, String>> {
     BTreeMap::new()
 }
 
 /// Decodes primitives that Draco packed: elements of the accessors that they fill. Primitives that
 /// share a stream and its accessors are decoded once.
 #[cfg(feature = "draco")]
-fn decode_primitives(reader: &Reader) -> BTreeMap<usize, Result<DecodedElements, String>> {
+fn decode_primitives(reader: &Reader, progress: Listener) -> BTreeMap<usize, Result<DecodedElements, String>> {
     let primitives = reader.document.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let streams: BTreeSet<draco::Stream> = primitives.filter_map(draco::Stream::from_primitive).collect();
     let streams: Vec<draco::Stream> = streams.into_iter().collect();
-    let decoded: Vec<_> = streams.par_iter().map(|stream| draco::decode(reader, stream)).collect();
+    let decoded = decode_all(&streams, |stream| draco::decode(reader, stream), progress);
 
     // an error of a stream is one of all of its accessors but those with data of their own
     let accessor = |index: usize| reader.document.accessors.get(index);

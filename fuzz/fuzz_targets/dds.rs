@@ -1,0 +1,2 @@
+#![no_main]
+skylit_fuzz::fuzz!(dds);
