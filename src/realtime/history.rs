@@ -64,6 +64,8 @@ pub struct History {
     pub paths: PathSequence,
     /// Lights or materials have changed: histories of radiance count less.
     pub has_new_light: bool,
+    /// Nothing emits light in the scene as it is.
+    pub is_black: bool,
     /// The rotation to the environment map, if it is not yet on the device.
     pub environment_turn: Option<DMat3>,
     /// A frame was interrupted: the samples at rest are in pieces and start anew.

@@ -231,13 +231,20 @@ impl Realtime {
     }
 
     /// Moves lights and emissive surfaces to where they are in `scene` from the next frame on, and
-    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated.
+    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated. Where
+    /// nothing has emitted light, and something does, frames begin without a history.
     ///
     /// # Errors
     /// Those of the device; [`Error::Scene`] where lights were switched, which needs other shaders.
     pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
         if self.graph.move_lights(tracer, scene)? {
             self.change_light();
+        }
+
+        // samples that are black throughout say nothing of light that begins, nor how noisy it is
+        let was_black = std::mem::replace(&mut self.history.is_black, scene.is_black());
+        if was_black && !self.history.is_black && self.signal.depends_on_light() {
+            self.start_at(self.history.frame);
         }
         Ok(())
     }

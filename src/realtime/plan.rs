@@ -306,6 +306,7 @@ impl FramePlan {
             denoised_samples: self.denoised_samples,
             paths,
             has_new_light: false,
+            is_black: history.is_black,
             environment_turn: None,
             was_interrupted: false,
             shown: Some(inputs.display),

@@ -41,7 +41,7 @@ pub use texture::{Filter, TexelData, Texture, Wrap};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three
 /// lengths overflow single precision, and rays would miss.
@@ -197,11 +197,18 @@ impl Scene {
     /// Whether nothing in it emits light: it has no environment, no lights, and no surface that
     /// emits or shows its colour unlit.
     pub fn is_dark(&self) -> bool {
+        self.lights.is_empty() && self.is_black()
+    }
+
+    /// Whether nothing in it emits light in its pose: as [`Scene::is_dark`], but there may be lights
+    /// whose intensity is 0.
+    pub fn is_black(&self) -> bool {
         let shines = |i: &Instance| {
             let material = &self.materials[self.meshes[i.mesh].material];
             material.unlit || material.emissive.max_element() > 0.0
         };
-        self.environment == Environment::Black && self.lights.is_empty() && !self.shown_instances().any(shines)
+        let is_off = |l: &Light| l.intensity == Vec3::ZERO;
+        self.environment == Environment::Black && self.lights.iter().all(is_off) && !self.shown_instances().any(shines)
     }
 
     /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for

@@ -175,7 +175,18 @@ fn a_skin_against_its_closed_form() {
         assert_eq!((changes.meshes[0].mesh, changes.meshes[0].positions.len()), (0, 4));
         assert_eq!(changes.meshes[0].normals.map(<[Vec3]>::len), Some(4));
     }
-    // posed at rest where nothing is animated, and the same without normals
+    // posed at rest where nothing is animated, mirrored with its skeleton: the front of a triangle stays its front
+    let mut doc = bound(true);
+    doc.push("nodes", json!({ "name": "left", "children": [1], "scale": [-1, 1, 1] }));
+    doc.json["scenes"][0]["nodes"] = json!([0, 3]);
+    let scene = doc.load();
+    let (to_world, shape) = (scene.instances[0].object_to_world, mesh(&scene, 0));
+    assert!(to_world.matrix3.determinant() < 0.0 && shape.indices[0] == [0, 1, 2]);
+    for ((p, n), wanted) in shape.positions.iter().zip(&shape.normals).zip(closed_form(0.0)) {
+        near(to_world.transform_point3(p.as_dvec3()), wanted * DVec3::new(-1.0, 1.0, 1.0));
+        near(n.as_dvec3(), DVec3::new(0.0, 0.6, 0.8));
+    }
+    // and the same without normals
     let mut doc = bound(false);
     doc.json["nodes"][2]["rotation"] = json!([0, 0, H, H]);
     let scene = doc.load();

@@ -431,7 +431,7 @@ fn opacity_in_its_many_spellings() {
         let scene = with_mtl(&folder, &format!("newmtl m\n{mtl}\n"));
         scene.materials[0].clone()
     };
-    for opaque in ["d 1", "d 1\nTr 0", "d 1\nTr 1", "Tr 1", "Tr 0", "", "d 2", "d -halo 1"] {
+    for opaque in ["d 1", "d 1\nTr 0", "d 1\nTr 1", "Tr 1", "Tr 0", "", "d 2", "d -halo 1", "d 0", "d -1"] {
         let m = material(opaque);
         assert_eq!(
             (m.kind, m.alpha_mode, m.base_color.w),
@@ -440,13 +440,11 @@ fn opacity_in_its_many_spellings() {
         );
     }
     for (mtl, alpha) in [
-        ("d 0", 0.0),
         ("d 0.999", 0.999),
         ("Tr 0.75", 0.25),
         ("d 0.5\nTr 0.25", 0.5),
         ("d 0.5\nillum 2\nNi 1.5", 0.5),
         ("d -halo 0.5", 0.5),
-        ("d -1", 0.0),
         ("d 0.5\nTf 1 1 1", 0.5),
         ("d 0.5\nTf 0 0 0\nNi 1.5", 0.5),
         // 3ds Max: Tf is a copy of d
@@ -476,8 +474,14 @@ fn opacity_in_its_many_spellings() {
     }
     assert_eq!(material("Kd 0 0 0\nKs 0.95 0.95 0.95\nillum 5").kind, MaterialKind::Mirror);
     // a library in which all is hidden has d for Tr; one in which something shows has not
-    let scene = with_mtl(&folder, "newmtl m\nTr 1\nnewmtl n\nTr 0\n");
-    assert_eq!((scene.materials[0].alpha_mode, scene.materials[0].base_color.w), (AlphaMode::Blend, 0.0));
+    for hidden in ["Tr 1", "d 0", "d -1"] {
+        let scene = with_mtl(&folder, &format!("newmtl m\n{hidden}\nnewmtl n\nTr 0\n"));
+        assert_eq!((scene.materials[0].alpha_mode, scene.materials[0].base_color.w), (AlphaMode::Blend, 0.0));
+        let scene = with_mtl(&folder, &format!("newmtl m\n{hidden}\nnewmtl n\nillum 1\nd 0\n"));
+        assert!(scene.materials.iter().all(|m| m.alpha_mode == AlphaMode::Opaque), "{hidden}");
+        let warnings = &scene.report.warnings;
+        assert!(warnings.iter().any(|w| w.contains("would hide every material")), "{warnings:?}");
+    }
 }
 
 /// Exporters that write `d` for glass have a setting, which can be changed at any time.

@@ -557,6 +557,46 @@ fn changing_values() -> Scene {
     scene
 }
 
+/// Where nothing emits, samples are black and have no variance, which says nothing of light that begins: frames are those of an image that begins with it.
+#[test]
+fn gpu_frames_of_light_that_begins_have_no_black_histories() {
+    let device = device();
+    let scene = changing_values();
+    let lamp = scene.materials.iter().position(|m| m.emissive != Vec3::ZERO).unwrap();
+    let mut black = scene.clone();
+    black.materials[lamp].emissive = Vec3::ZERO;
+    assert!(black.is_black() && !black.is_dark() && !scene.is_black());
+    let motion = scene.rig.as_ref().unwrap().motion(0).unwrap();
+    let flat = FlatScene::with_motion_and_blend(&scene, motion, Blend::Stochastic).unwrap();
+    let mut tracer = tracer(&device, TracerKind::Compute, &flat);
+    let camera = record(&scene, &scene.cameras[0]);
+    let brightest = |f: &Realtime| f.result().unwrap().into_iter().fold(0.0, f32::max);
+
+    let mut changing = frames(&tracer, &flat, &converging(), &options(1));
+    for (k, posed) in [&black, &black, &scene].into_iter().enumerate() {
+        let change = tracer.set_materials(&[(lamp, posed.materials[lamp].clone())]).unwrap();
+        changing.change_materials(change);
+        changing.move_lights(&tracer, posed).unwrap();
+        changing.frame(&tracer, &camera, &[]).unwrap();
+        assert_eq!(brightest(&changing) > 0.0, !posed.is_black(), "frame {k}");
+    }
+    let mut begun = frames(&tracer, &flat, &converging(), &options(1));
+    begun.start_at(2);
+    begun.frame(&tracer, &camera, &[]).unwrap();
+    assert_eq!(changing.result().unwrap(), begun.result().unwrap());
+    assert_eq!(changing.samples().unwrap(), begun.samples().unwrap());
+
+    // light that goes on changing has histories
+    scene.materials[lamp].clone_into(&mut black.materials[lamp]);
+    black.materials[lamp].emissive *= 1.01;
+    tracer.set_materials(&[(lamp, black.materials[lamp].clone())]).unwrap();
+    changing.move_lights(&tracer, &black).unwrap();
+    changing.frame(&tracer, &camera, &[]).unwrap();
+    let most = |f: &Realtime| f.samples().unwrap().into_iter().fold(0.0, f32::max);
+    assert!(most(&changing) > most(&begun), "{} and {}", most(&changing), most(&begun));
+    assert_validation_clean(&device);
+}
+
 /// Materials and lights have the values of their animation: frames are those of the scene with these values, on every tracer, also where a light goes out or begins, and an extension's lobe.
 #[test]
 fn gpu_frames_materials_and_lights_change() {

@@ -180,10 +180,12 @@ pub(in crate::renderer) fn rounded(point: DVec3, size: f64) -> DVec3 {
 pub fn choose(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<ChosenCamera> {
     let bounds = scene.bounds().ok_or_else(no_geometry)?;
     let chosen = |camera: &Camera, words: &str| ChosenCamera::rounded(camera, DVec3::Y, fov_y, bounds, words);
-    let is_room = is_room(bounds, trace)?;
-    if !is_room || is_body(scene) {
+    let (is_room, is_body) = (is_room(bounds, trace)?, is_body(scene));
+    if !is_room || is_body {
         let (outside, score) = outside(scene, aspect, fov_y, trace)?;
-        if score >= 0.0 {
+        // a sheet may show its back to all sides, and a body that winds the wrong way does
+        let has_no_inside = is_flat(bounds) || is_body && !is_room;
+        if score >= 0.0 || has_no_inside {
             return Ok(chosen(&outside, OUTSIDE_WORDS));
         }
         // from all sides it shows backs more than fronts: walls that face what is between them
@@ -268,12 +270,16 @@ fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
         .collect()
 }
 
+fn is_flat((lo, hi): (DVec3, DVec3)) -> bool {
+    (hi - lo).min_element() <= 0.0
+}
+
 /// Whether the middle of a scene is in a room.
 fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
-    let extent = hi - lo;
-    if extent.min_element() <= 0.0 {
+    if is_flat((lo, hi)) {
         return Ok(false);
     }
+    let extent = hi - lo;
     for height in HEIGHTS {
         let distances = distances(lo + extent * DVec3::new(0.5, height, 0.5), trace)?;
         let is_room = distances.len() as f64 >= ENCLOSED * PROBES as f64
@@ -518,6 +524,26 @@ mod tests {
         walls.meshes.push(second);
         walls.instances.push(Instance { mesh: 1, ..walls.instances[0].clone() });
         assert!(is_inside(eye(&walls)));
+    }
+
+    /// A solid body that winds the wrong way, and a floor that faces down.
+    #[test]
+    fn backs_alone_are_seen_from_outside() {
+        let mut rod = builtin::by_name("closed-box").unwrap();
+        let to_rod = DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.02));
+        rod.instances[0].object_to_world = to_rod * rod.instances[0].object_to_world;
+        let mut floor = scene();
+        floor.meshes.truncate(1);
+        floor.instances.truncate(1);
+        floor.meshes[0].geometry = shapes::rectangle(DVec3::ZERO, DVec3::Z * 2.0, DVec3::X * 2.0);
+        for up in [false, true] {
+            for scene in [&mut rod, &mut floor] {
+                let Geometry::Triangles(mesh) = &mut scene.meshes[0].geometry else { panic!("no triangles") };
+                mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
+                let chosen = choose_on_host(&Survey::new(scene), 1.5, None).unwrap();
+                assert!(chosen.words.contains("outside"), "{up}: {}", chosen.words);
+            }
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ mod values;
 pub use deform::{Deformation, Influences, MorphTarget, VertexData};
 pub use pose::{Playback, Pose, PosedMesh};
 pub use sampler::{Interpolation, Sampler};
-pub(in crate::scene) use transform::anchor;
+pub(in crate::scene) use transform::{from_skin_place, skin_place};
 pub use values::{
     AnimatedLight, AnimatedMaterial, CameraProperty, LightProperty, MaterialProperty, SLOTS, Target, TextureTransform,
     ValueChannel,

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
-use super::transform::{anchor, at_least};
+use super::transform::{at_least, from_skin_place, skin_place};
 use super::{
     Animation, AnimationRig, Channel, Deformation, LightProperty, LocalTransform, MaterialProperty, Property, Target,
     VertexData,
@@ -491,20 +491,20 @@ impl AnimationRig {
         known: &'a mut [Vec<DAffine3>],
     ) -> &'a [DAffine3] {
         let Some(number) = deformation.skin else { return &[] };
-        let (skin, anchor) = (&self.parts.skins[number], self.anchor(number));
+        let (skin, place) = (&self.parts.skins[number], self.skin_place(number));
         let out = &mut known[number];
         if out.is_empty() {
-            out.extend(skin.joints.iter().zip(&skin.inverse_bind).map(|(&j, bind)| {
-                let near = DAffine3 { translation: world[j].translation - anchor, ..world[j] };
-                near * *bind
-            }));
+            let joints = skin.joints.iter().zip(&skin.inverse_bind);
+            out.extend(joints.map(|(&j, bind)| from_skin_place(&place, &world[j]) * *bind));
         }
         out
     }
 
-    /// World position of the instances of meshes with this skin.
-    fn anchor(&self, skin: usize) -> DVec3 {
-        self.parts.skins[skin].joints.first().map_or(DVec3::ZERO, |&j| anchor(&self.rest[j]))
+    /// Object-to-world transform of the instances of meshes with this skin.
+    fn skin_place(&self, skin: usize) -> DAffine3 {
+        let skin = &self.parts.skins[skin];
+        let first = skin.joints.first().zip(skin.inverse_bind.first());
+        first.map_or(DAffine3::IDENTITY, |(&j, bind)| skin_place(&self.rest[j], bind))
     }
 
     fn floor(&self, instance: usize) -> f64 {
@@ -532,11 +532,11 @@ impl AnimationRig {
         }
 
         // instances of meshes with skins
-        let skinned = rig.parts.deformations.iter().filter_map(|d| Some((d.mesh, rig.anchor(d.skin?))));
-        let places: HashMap<usize, DVec3> = skinned.collect();
+        let skinned = rig.parts.deformations.iter().filter_map(|d| Some((d.mesh, rig.skin_place(d.skin?))));
+        let places: HashMap<usize, DAffine3> = skinned.collect();
         for instance in &mut scene.instances {
-            if let Some(at) = places.get(&instance.mesh) {
-                instance.object_to_world = DAffine3::from_translation(*at);
+            if let Some(to_world) = places.get(&instance.mesh) {
+                instance.object_to_world = *to_world;
             }
         }
 

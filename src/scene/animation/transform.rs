@@ -1,14 +1,30 @@
 //! Transforms that are precise and invertible enough for tracers.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// World position of the instance of a skinned mesh, given its first joint's world transform at
 /// rest. It is near the joint, so that the mesh keeps its precision in f32 far from the origin; it
 /// is zero for skeletons near the origin.
-pub(in crate::scene) fn anchor(joint: &DAffine3) -> DVec3 {
+fn anchor(joint: &DAffine3) -> DVec3 {
     // so coarse that it is exact in f32
     const STEP: f64 = 1024.0;
     (joint.translation / STEP).round() * STEP
+}
+
+/// Object-to-world transform of the instance of a skinned mesh, given its first joint's world
+/// transform at rest and inverse bind matrix. Where the skeleton is mirrored, as of left hands and
+/// halves of characters, so is the instance: triangles keep the side that is their front.
+pub(in crate::scene) fn skin_place(joint: &DAffine3, bind: &DAffine3) -> DAffine3 {
+    let mirrors = (joint.matrix3 * bind.matrix3).determinant() < 0.0;
+    let axes = if mirrors { DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)) } else { DMat3::IDENTITY };
+    DAffine3 { matrix3: axes, translation: anchor(joint) }
+}
+
+/// A joint's world transform as seen from an instance at a [`skin_place`], whose axes are their own
+/// inverse.
+pub(in crate::scene) fn from_skin_place(place: &DAffine3, joint: &DAffine3) -> DAffine3 {
+    let near = DAffine3 { translation: joint.translation - place.translation, ..*joint };
+    DAffine3::from_mat3(place.matrix3) * near
 }
 
 /// `t` with at least the scale `floor` (above zero) in every direction; unchanged where it has
@@ -49,7 +65,7 @@ pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DMat3, DQuat};
+    use glam::DQuat;
 
     #[test]
     fn nothing_is_squashed_below_the_floor() {

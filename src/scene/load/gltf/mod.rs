@@ -36,7 +36,7 @@ use ::gltf::json::Root;
 
 use accessor::Reader;
 use decoded::Decoded;
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use rig::{MeshVariant, RigBuilder};
 use values::text;
 
@@ -137,13 +137,13 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
             let wanted = stage.wanted(at, index.value()).map_err(input)?;
             for made in meshes.read_mesh(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
                 // the node's transform does not apply to a skinned mesh
-                let places = match (&copies, made.anchor) {
+                let places = match (&copies, made.place) {
                     (Some(copies), None) => {
                         let place = |copy: &DAffine3| (placed.to_world * *copy, stage.carrier_of_copy(at, copy));
                         copies.iter().map(place).collect()
                     }
                     (_, None) => vec![(placed.to_world, Some(at))],
-                    (_, Some(anchor)) => vec![(DAffine3::from_translation(anchor), None)],
+                    (_, Some(place)) => vec![(place, None)],
                 };
                 for (object_to_world, carrier) in places {
                     scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
@@ -221,8 +221,8 @@ struct Meshes<'a> {
 #[derive(Clone, Copy)]
 struct LoadedMesh {
     mesh: usize,
-    /// World position of its instances if it has a skin.
-    anchor: Option<DVec3>,
+    /// Object-to-world transform of its instances if it has a skin.
+    place: Option<DAffine3>,
 }
 
 impl Meshes<'_> {
@@ -286,9 +286,9 @@ impl Meshes<'_> {
             if let (Some(deformation), Some(kept)) = (&mut deformation, kept) {
                 deformation.reorder(&kept);
             }
-            let anchor = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
+            let place = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
             let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
-            made.push(LoadedMesh { mesh: scene.meshes.len(), anchor });
+            made.push(LoadedMesh { mesh: scene.meshes.len(), place });
             scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
         }
         self.primitives.insert(wanted.clone(), made.clone());

@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 
 use ::gltf::json::mesh::Primitive;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, Vec3};
 
 use super::accessor::Reader;
 use super::node::{Doubles, PlacedNode, is_hidden};
 use super::values::text;
 use super::{animation, pointer, skin};
 use crate::scene::animation::{
-    AnimatedLight, Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, Target, VertexData, anchor,
-    renumbered,
+    AnimatedLight, Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, Target, VertexData,
+    from_skin_place, renumbered, skin_place,
 };
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
@@ -247,17 +247,15 @@ impl<'a> RigBuilder<'a> {
         wanted: &MeshVariant,
         mesh: usize,
         triangles: &mut TriangleMesh,
-    ) -> Option<DVec3> {
+    ) -> Option<DAffine3> {
         let skin = made.skin.map(|s| &self.skins[&s]);
-        let place = skin.and_then(|s| Some(anchor(&self.placed[*s.joints.first()?].to_world)));
+        let first = skin.and_then(|s| s.joints.first().zip(s.inverse_bind.first()));
+        let place = first.map(|(&j, bind)| skin_place(&self.placed[j].to_world, bind));
         // once for all meshes of a skin
         let (placed, moves) = (self.placed, &self.moves);
         let rest = made.skin.zip(skin).zip(place).map(|((number, skin), place)| {
             &*self.rests.entry(number).or_insert_with(|| {
-                let joint = |(&j, bind): (&usize, &DAffine3)| {
-                    let to_world = placed[j].to_world;
-                    DAffine3 { translation: to_world.translation - place, ..to_world } * *bind
-                };
+                let joint = |(&j, bind): (&usize, &DAffine3)| from_skin_place(&place, &placed[j].to_world) * *bind;
                 let joints = skin.joints.iter().zip(&skin.inverse_bind).map(joint).collect();
                 (skin.joints.iter().any(|&j| moves[j]), joints)
             })

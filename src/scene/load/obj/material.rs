@@ -77,8 +77,8 @@ impl<'a> MaterialLibrary<'a> {
         let warnings = &mut scene.report.warnings;
         let mut parsed = mtl::parse(&text::decode(&bytes), &mut |w| warnings.push(format!("{file}, {w}")));
         if vanishes(&parsed) {
-            warnings.push(format!("{file}: `Tr 1` would hide every material: taken for a copy of `d`, opaque"));
-            parsed.iter_mut().for_each(|m| m.transparency = None);
+            warnings.push(format!("{file}: `d 0` or `Tr 1` would hide every material: they are shown as opaque"));
+            parsed.iter_mut().for_each(|m| (m.dissolve, m.transparency) = (None, None));
         }
         self.textures.decode_ahead(parsed.iter().flat_map(MtlMaterial::colour_and_surface_maps), [mtl, obj]);
 
@@ -262,9 +262,10 @@ fn opacity(m: &MtlMaterial) -> f32 {
     m.dissolve.or(m.transparency.map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0)
 }
 
-/// Whether a library says `Tr 1` of all its materials: `Tr` is 1 - d, but some exporters write d.
+/// Whether a library hides all its materials: `Tr` is 1 - d, but some exporters write d, and others
+/// write `d 0` of a model whose alpha they do not know.
 fn vanishes(materials: &[MtlMaterial]) -> bool {
-    let is_hidden = |m: &MtlMaterial| m.dissolve.is_none() && m.transparency.is_some_and(|t| t >= 1.0);
+    let is_hidden = |m: &MtlMaterial| opacity(m) == 0.0 && m.map_dissolve.is_none();
     !materials.is_empty() && materials.iter().all(is_hidden)
 }
 
