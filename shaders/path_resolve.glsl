@@ -4,8 +4,8 @@
 #include "common/film.glsl"
 #include "path/params.glsl"
 
-bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
-    PathParams path = path_params();
+bool add_sample(inout FilmPixel pixel, FilmParams p, uint k) {
+    PathParams path = PathParams(p.integrator);
     vec4 sample_ = load_quad(path.radiance, k);
     sample_.rgb *= occluded_share(path, sample_);
     // also false for NaN

@@ -9,13 +9,11 @@
 
 const uint NO_MEDIUM = 0xffffffffu;
 
-// The parameters of a pass of paths. They lie behind those of its block: their address then follows from push constants alone, and a CPU driver reads them once for all lanes
-// (src/shaders/specialize/uniform.rs).
-PathParams path_params() {
-    uint carry;
-    uint low = uaddCarry(push.pass.x, BLOCK_PARAMS_BYTES, carry);
-    return PathParams(uvec2(low, push.pass.y + carry));
-}
+// The parameters of a pass of paths.
+PathParams path_params() { return PathParams(behind_block()); }
+
+// Those that it has besides in frames in real time.
+PathFrameParams path_frame_params() { return PathFrameParams(offset_address(push.pass, BLOCK_PARAMS_BYTES + PATH_PARAMS_BYTES)); }
 
 // A path between two bounces, in memory a PathRecord.
 struct PathState {

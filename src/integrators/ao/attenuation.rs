@@ -1,5 +1,8 @@
 //! Attenuation of ambient occlusion with distance, for stills and real-time frames.
 
+use super::Hemisphere;
+use crate::interface::records::ao::OcclusionRecord;
+
 /// Occlusion below which no hit changes a sample: 1 minus that is 1 in single precision.
 const INSIGNIFICANT: f64 = 1.0 / 33_554_432.0;
 /// Occlusion below which frames do not search for hits: half a step of an 8-bit image.
@@ -30,6 +33,15 @@ impl Attenuation {
     /// Distance at which a hit occludes this much, or the radius if that is less.
     fn distance_of(self, occlusion: f64) -> f64 {
         if self.is_binary() { self.radius } else { self.radius.min(-occlusion.ln() / self.falloff.ln()) }
+    }
+
+    /// As shaders of stills and paths read it, with the axis of the hemisphere.
+    pub fn record(self, hemisphere: Hemisphere) -> OcclusionRecord {
+        OcclusionRecord {
+            reach: self.reach() as f32,
+            falloff_log2: self.falloff_log2() as f32,
+            hemisphere: (hemisphere == Hemisphere::Shading).into(),
+        }
     }
 
     /// Returns true if any hit occludes fully, so that the closest one need not be found.

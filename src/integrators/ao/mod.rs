@@ -23,10 +23,12 @@ use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::accumulate::{Accumulated, Estimator, accumulate, max_rays};
-use crate::film::block::BlockParams;
+use crate::film::block::{BlockParams, PassParams};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
+use crate::interface::records::ao::AoParams;
+use crate::interface::records::film::FilmParams;
 use crate::output::Image;
 use crate::ray::Ray;
 use crate::settings::Capability;
@@ -225,7 +227,9 @@ struct AoEstimator {
     rays: AoRays,
     has_entry_points: bool,
     resolve: ComputePipeline,
-    params: Buffer,
+    params: PassParams<AoParams>,
+    own: AoParams,
+    film: Buffer,
     dumps: Option<[Buffer; 2]>,
     kept: [Vec<Ray>; 2],
     // samples and camera rays of all launches, padding included
@@ -251,24 +255,19 @@ pub fn render(
     let samples = &options.samples;
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
+    let rays = AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.max(1).ilog2())?;
     let mut estimator = AoEstimator {
-        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.max(1).ilog2())?,
-        has_entry_points: false,
+        own: rays.params(options.attenuation().record(options.hemisphere), camera),
+        has_entry_points: rays.has_entry_points(camera),
+        rays,
         resolve: shaders::RESOLVE.pipeline(device)?,
-        params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
+        params: PassParams::new(device, "parameters of ambient occlusion")?,
+        film: Buffer::new(device, "parameters of the film", size_of::<FilmParams>() as u64, Memory::Upload)?,
         dumps: if samples.keep_rays { Some([ray_buffer(device, most)?, ray_buffer(device, most)?]) } else { None },
         kept: Default::default(),
         launched: [0; 2],
     };
-    let params = estimator.rays.params(BlockParams {
-        orthographic: camera.orthographic.into(),
-        hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
-        falloff_log2: options.attenuation().falloff_log2() as f32,
-        radius: options.attenuation().reach() as f32,
-        ..Default::default()
-    });
-    estimator.has_entry_points = estimator.rays.has_entry_points(&params);
-    let image = accumulate(tracer, camera, samples, &params, &mut estimator, control)?;
+    let image = accumulate(tracer, camera, samples, &mut estimator, control)?;
     let has_entry_points = estimator.has_entry_points;
     let [kept_primary, kept_occlusion] = estimator.kept;
     let [launched_samples, launched_camera_rays] = estimator.launched;
@@ -292,11 +291,14 @@ impl Estimator for AoEstimator {
         self.dumps.is_some()
     }
 
-    fn begin(&mut self, mut params: BlockParams, keep: bool) -> Result<u64> {
+    fn begin(&mut self, block: &BlockParams, film: u64, keep: bool) -> Result<u64> {
+        let mut own = self.own;
         if let Some(dumps) = self.dumps.as_ref().filter(|_| keep) {
-            [params.ray_dump, params.occlusion_dump] = [dumps[0].address(), dumps[1].address()];
+            [own.ray_dump, own.occlusion_dump] = [dumps[0].address(), dumps[1].address()];
         }
-        self.params.write(0, bytemuck::bytes_of(&params))?;
+        self.params.write(block, &own)?;
+        let film = FilmParams { film, integrator: self.params.own_address() };
+        self.film.write(0, bytemuck::bytes_of(&film))?;
         Ok(self.params.address())
     }
 
@@ -308,7 +310,8 @@ impl Estimator for AoEstimator {
                 self.rays.record(r, push, self.has_entry_points);
                 r.barrier();
                 let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
-                r.timed("resolve", |r| r.dispatch(&self.resolve, push, groups));
+                let resolved = Push { pass: self.film.address(), ..*push };
+                r.timed("resolve", |r| r.dispatch(&self.resolve, &resolved, groups));
                 // the next launch reuses the queue and the samples
                 r.barrier();
             }

@@ -2,8 +2,9 @@
 
 use super::{Attenuation, NO_HIT};
 use crate::error::Result;
+use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Memory, Recorder};
-use crate::interface::records::block::BlockParams;
+use crate::interface::records::ao::{AoParams, OcclusionRecord};
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::entry_points::EntryPoints;
 use crate::tracer::queue::RayQueue;
@@ -56,23 +57,24 @@ impl AoRays {
         self.samples.address()
     }
 
-    /// Returns true if camera rays start below the root of the hierarchy, in launches of enough
-    /// samples: `params` are of [`AoRays::params`].
-    pub fn has_entry_points(&self, params: &BlockParams) -> bool {
-        self.entry_points.is_some() && params.orthographic == 0
+    /// Returns true if rays of the camera start below the root of the hierarchy, in launches of
+    /// enough samples.
+    pub fn has_entry_points(&self, camera: &CameraRecord) -> bool {
+        self.entry_points.is_some() && !camera.orthographic
     }
 
-    /// `params` with the addresses that the streams read.
-    pub fn params(&self, params: BlockParams) -> BlockParams {
-        BlockParams {
+    /// The parameters of the streams.
+    pub fn params(&self, occlusion: OcclusionRecord, camera: &CameraRecord) -> AoParams {
+        AoParams {
+            occlusion,
             samples: self.samples.address(),
             queue: self.queue.record(),
             camera_shift: self.camera_shift,
             entry_points: match &self.entry_points {
-                Some(lists) if self.has_entry_points(&params) => lists.address(),
+                Some(lists) if self.has_entry_points(camera) => lists.address(),
                 _ => 0,
             },
-            ..params
+            ..Default::default()
         }
     }
 

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{AoOptions, AoResult};
 use crate::film::covered_mean;
 use crate::integrators::IntegratorReport;
-use crate::interface::records::block::MAX_ENTRY_POINTS;
+use crate::interface::records::ao::MAX_ENTRY_POINTS;
 
 /// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {

@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-use crate::film::block::BlockParams;
 use crate::integrators::IntegratorSettings;
 use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::settings::choices;
@@ -49,16 +48,6 @@ impl Ambient {
             attenuation: Attenuation { radius: ao.radius(), falloff: ao.ao_falloff.unwrap_or(1.0) },
             hemisphere: ao.hemisphere(),
             occluded: settings.path.occluded_light.unwrap_or_default(),
-        }
-    }
-
-    /// The parameters of occlusion rays.
-    pub(super) fn block_params(&self) -> BlockParams {
-        BlockParams {
-            hemisphere: (self.hemisphere == Hemisphere::Shading) as u32,
-            falloff_log2: self.attenuation.falloff_log2() as f32,
-            radius: self.attenuation.reach() as f32,
-            ..Default::default()
         }
     }
 }

@@ -1,7 +1,16 @@
-//! Pixels of the film on the device: compensated sums (Kahan 1965), each a sum and its excess.
+//! The film on the device: compensated sums (Kahan 1965) for each pixel, each a sum and its excess,
+//! and the parameters of the passes that add samples to it.
 
 records! {
     "film";
+
+    /// Parameters of the passes that add the samples of a launch to the film.
+    FilmParams: Block(access: "readonly", align: 8) {
+        /// The film's pixels, in the order of the block.
+        film: address,
+        /// Address of the integrator's own parameters, which lead to the samples.
+        integrator: address,
+    }
 
     /// A pixel of a film of one channel.
     ScalarFilmPixel: Array(buffer: "ScalarFilm", access: "", align: 8) {

@@ -1,6 +1,7 @@
 //! Records in device memory, push constants and shared numbers, one file per subject.
 
 pub mod albedo;
+pub mod ao;
 pub mod aov;
 pub mod block;
 pub mod denoise;
@@ -24,12 +25,13 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 21] = [
+pub const FILES: [&File; 22] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
     &shading::FILE,
     &block::FILE,
+    &ao::FILE,
     &film::FILE,
     &super::path_options::FILE,
     &lights::FILE,
