@@ -15,7 +15,6 @@ use crate::files;
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, covered_mean};
 use crate::gpu::{Buffer, Device};
-use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::{PathOptions, PixelFilter};
 use crate::integrators::{IntegratorName, PictureOptions};
@@ -149,13 +148,12 @@ impl Renderer {
                 // samples lie where the frames have them
                 options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
             }
-            None => vec![
-                ("ao.falloff", realtime_settings.falloff.to_string()),
-                ("ao.radius", realtime_settings.radius.to_string()),
-                ("ao.normal", realtime_settings.hemisphere.to_string()),
-                ("sequence", realtime_settings.sequence.to_string()),
-                ("technique", realtime_settings.technique.to_string()),
-            ],
+            None => {
+                let mut metadata = Vec::from(realtime_settings.occlusion.metadata());
+                metadata.push(("sequence", realtime_settings.sequence.to_string()));
+                metadata.push(("technique", realtime_settings.technique.to_string()));
+                metadata
+            }
         };
         let filter = if realtime_settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
         metadata.extend([
@@ -410,7 +408,7 @@ pub fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
 pub fn frame_needs(settings: &RenderSettings, realtime_settings: &Settings) -> Needs {
     let integrator = settings.integrator();
     let needs = if is_ambient_occlusion(integrator) {
-        Needs { normals: realtime_settings.hemisphere == Hemisphere::Shading, ..Default::default() }
+        Needs { normals: realtime_settings.occlusion.is_about_shading_normals(), ..Default::default() }
     } else {
         integrator.get().needs(&settings.integrators)
     };

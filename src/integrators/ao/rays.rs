@@ -1,6 +1,6 @@
 //! The rays of samples of ambient occlusion: camera rays, and occlusion rays from their hits.
 
-use super::{Attenuation, NO_HIT};
+use super::{NO_HIT, Occlusion};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Memory, Recorder};
@@ -21,9 +21,9 @@ pub struct AoRays {
 }
 
 /// The streams that samples need: without a falloff any hit ends an occlusion ray.
-pub fn streams(attenuation: Attenuation) -> [&'static StreamShaders; 2] {
-    let occlusion = if attenuation.is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST };
-    [&shaders::PRIMARY_CLOSEST, occlusion]
+pub fn streams(occlusion: Occlusion) -> [&'static StreamShaders; 2] {
+    let traced = if occlusion.is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST };
+    [&shaders::PRIMARY_CLOSEST, traced]
 }
 
 impl AoRays {
@@ -32,15 +32,9 @@ impl AoRays {
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(
-        tracer: &Tracer,
-        attenuation: Attenuation,
-        most: u32,
-        sample_bits: u32,
-        camera_shift: u32,
-    ) -> Result<Self> {
+    pub fn new(tracer: &Tracer, occlusion: Occlusion, most: u32, sample_bits: u32, camera_shift: u32) -> Result<Self> {
         let device = tracer.device();
-        let [primary, occlusion] = streams(attenuation);
+        let [primary, occlusion] = streams(occlusion);
         let primary = tracer.stream(primary)?;
         Ok(Self {
             entry_points: EntryPoints::new(tracer, &primary, most, sample_bits.saturating_sub(camera_shift))?,

@@ -17,7 +17,7 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
 use crate::gpu::{Commands, Timing};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 use crate::shaders;
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
@@ -53,9 +53,9 @@ pub fn trace(
     control: &mut dyn Control,
     take: &mut TakeSamples,
 ) -> Result<()> {
-    let unlimited = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
-    let hemisphere = options.ambient.map(|a| a.hemisphere).unwrap_or_default();
-    let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere, occluded: OccludedLight::Ambient };
+    let hemisphere = options.ambient.map(|a| a.occlusion.hemisphere).unwrap_or_default();
+    let unlimited = Occlusion { hemisphere, ..Default::default() };
+    let ambient = Ambient { color: Vec3::ONE, occlusion: unlimited, occluded: OccludedLight::Ambient };
     // every sample of every tile, in one go
     let SampleSettings { size, spp, seed, pixel_filter, .. } = options.samples;
     let samples = SampleSettings { size, spp, seed, pixel_filter, ..Default::default() };

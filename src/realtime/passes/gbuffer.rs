@@ -3,7 +3,6 @@
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams, PassParams};
 use crate::gpu::Recorder;
-use crate::integrators::ao::Hemisphere;
 use crate::interface::records::frame::GbufferParams;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
@@ -28,7 +27,7 @@ pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primar
     let pass = Gbuffer {
         rays: CameraRays::new(tracer, STREAM, primary, block.size)?,
         params: PassParams::new(tracer.device(), "G-buffer parameters")?,
-        has_axes: settings.hemisphere == Hemisphere::Shading,
+        has_axes: settings.occlusion.is_about_shading_normals(),
         is_dynamic: tracer.is_dynamic(),
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1, settings.launch_rays)))

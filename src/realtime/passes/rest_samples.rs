@@ -45,7 +45,7 @@ impl Traced {
     fn new(frame: &Frame, most: u32, sample_bits: u32) -> Result<Self> {
         let device = frame.tracer.device();
         Ok(Self {
-            rays: AoRays::new(frame.tracer, frame.settings.attenuation(), most, sample_bits, 0)?,
+            rays: AoRays::new(frame.tracer, frame.settings.occlusion, most, sample_bits, 0)?,
             has_entry_points: false,
             block: PassParams::new(device, "block parameters of samples at rest")?,
             resolve: shaders::REST_SAMPLES.pipeline(device)?,
@@ -73,8 +73,7 @@ impl Pass for RestSamples {
             ..frame.block.params(frame.block.size, camera, settings.seed.wrapping_add(SEED))
         };
         traced.has_entry_points = traced.rays.has_entry_points(camera);
-        let occlusion = settings.attenuation().record(settings.hemisphere);
-        traced.block.write(&block, &traced.rays.params(occlusion, camera))?;
+        traced.block.write(&block, &traced.rays.params(settings.occlusion.record(), camera))?;
         traced.params.write(&RestSamplesParams {
             frame: frame.params,
             samples: traced.rays.samples(),
