@@ -1,14 +1,13 @@
 //! Settings of the renders that a comparison makes on the spot.
 
-use skylit::integrators;
 use skylit::compare::render::{add_ids, first_frame, settings};
+use skylit::integrators;
 use skylit::renderer::RenderSettings;
 
 #[test]
 fn shared_settings_go_where_they_have_an_effect() {
     let shared = RenderSettings::from_words("--size 20x10 --spp 3 --environment 1,1,1 --fov-y 30").unwrap();
-    let [ao, path, frames] = &settings(&["ao --ao-radius 2", "path --spp 9", "balanced"], &shared).unwrap()[..]
-    else {
+    let [ao, path, frames] = &settings(&["ao --ao-radius 2", "path --spp 9", "balanced"], &shared).unwrap()[..] else {
         panic!()
     };
     assert_eq!((ao.image.size, ao.image.spp, ao.lighting.environment.as_deref()), (Some([20, 10]), Some(3), None));
@@ -30,16 +29,13 @@ fn what_has_no_effect_is_an_error() {
 
 #[test]
 fn frames_have_what_is_for_frames_and_stills_a_time() {
-    let shared =
-        RenderSettings::from_words("--ao-radius 2 --frames 0..8 --orbit 120 --at-rest hold --spp 4").unwrap();
+    let shared = RenderSettings::from_words("--ao-radius 2 --frames 0..8 --orbit 120 --at-rest hold --spp 4").unwrap();
     let [frames, still] = &settings(&["balanced", "ao"], &shared).unwrap()[..] else { panic!() };
     assert_eq!((frames.integrators.ao.radius(), still.integrators.ao.radius()), (2.0, 2.0));
     assert!(frames.frames.at_rest.is_some() && frames.realtime_setting().is_some() && frames.image.spp.is_none());
     assert!(still.is_still_sequence() && still.frames.orbit == Some(120) && still.frames.at_rest.is_none());
     let shared = RenderSettings::from_words("--frames 0..8").unwrap();
-    assert!(
-        settings(&["balanced", "ao"], &shared).unwrap_err().to_string().contains("\"ao\": --frames makes a still")
-    );
+    assert!(settings(&["balanced", "ao"], &shared).unwrap_err().to_string().contains("\"ao\": --frames makes a still"));
 }
 
 #[test]

@@ -6,8 +6,7 @@ use skylit::output::{Channel, Image, Samples};
 
 fn entry(name: &str, width: u32, value: f32) -> Entry {
     let samples = Samples::F32(vec![value; 2 * width as usize]);
-    let image =
-        Image { width, height: 2, channels: vec![Channel { name: "Y".into(), samples }], metadata: Vec::new() };
+    let image = Image { width, height: 2, channels: vec![Channel { name: "Y".into(), samples }], metadata: Vec::new() };
     Entry { name: name.into(), image, ..Entry::default() }
 }
 
@@ -31,8 +30,7 @@ fn errors_name_the_images() {
     assert!(text.contains("A (a.exr) against B (b.exr)") && text.contains("2x2 and 3x2"), "{text}");
     assert!(error(vec![entry("a", 2, 0.5)], 0).contains("two images"));
     assert!(
-        error(vec![entry("a", 2, 0.5), entry("b", 2, 0.5)], 2)
-            .contains("--reference C: there are 2 images, A to B")
+        error(vec![entry("a", 2, 0.5), entry("b", 2, 0.5)], 2).contains("--reference C: there are 2 images, A to B")
     );
 }
 

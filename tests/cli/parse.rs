@@ -9,14 +9,9 @@ fn numbers() {
     for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
         assert!(parse_vector(bad).is_err(), "{bad}");
     }
+    assert!(parse_radiance("0,0.5,2").is_ok() && parse_radiance("1,-1,1").is_err() && parse_radiance("1,1").is_err());
     assert!(
-        parse_radiance("0,0.5,2").is_ok() && parse_radiance("1,-1,1").is_err() && parse_radiance("1,1").is_err()
-    );
-    assert!(
-        parse_fov("nan").is_err()
-            && parse_fov("0").is_err()
-            && parse_fov("180").is_err()
-            && parse_fov("45").is_ok()
+        parse_fov("nan").is_err() && parse_fov("0").is_err() && parse_fov("180").is_err() && parse_fov("45").is_ok()
     );
     assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
     assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());

@@ -32,9 +32,7 @@ fn enclosing_touches_what_it_holds() {
         let mut sides = [f64::NEG_INFINITY; 4];
         for (centre, radius) in &points {
             let p = world_to_camera.transform_point3(*centre);
-            for (side, value, tan) in
-                [(0, p.x, tan * aspect), (1, -p.x, tan * aspect), (2, p.y, tan), (3, -p.y, tan)]
-            {
+            for (side, value, tan) in [(0, p.x, tan * aspect), (1, -p.x, tan * aspect), (2, p.y, tan), (3, -p.y, tan)] {
                 // the sphere's distance from the plane through the eye at this side
                 let angle = value.atan2(-p.z) + (radius / (value.hypot(p.z))).asin();
                 sides[side] = sides[side].max(angle.tan() / tan);

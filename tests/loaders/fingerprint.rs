@@ -1,8 +1,8 @@
 //! Fingerprints of scenes change with whatever an image depends on.
 
 use glam::Vec3;
-use skylit::scene::{Environment, EnvironmentMap, Geometry, Scene, builtin};
 use skylit::scene::fingerprint::{of_environment, of_scene};
+use skylit::scene::{Environment, EnvironmentMap, Geometry, Scene, builtin};
 
 /// A change to a scene.
 type Change = dyn Fn(&mut Scene);
@@ -65,8 +65,7 @@ fn environments_differ_by_their_radiance() {
             to_map: glam::DMat3::IDENTITY,
         })
     };
-    let all =
-        [Environment::Black, Environment::Uniform(Vec3::ONE), Environment::Uniform(Vec3::X), map(1.0), map(2.0)];
+    let all = [Environment::Black, Environment::Uniform(Vec3::ONE), Environment::Uniform(Vec3::X), map(1.0), map(2.0)];
     let prints: Vec<_> = all.iter().map(of_environment).collect();
     for (k, print) in prints.iter().enumerate() {
         assert_eq!(prints.iter().position(|p| p == print), Some(k));

@@ -55,9 +55,8 @@ fn parts_hold_the_whole() {
 /// Cutting is worth it: each half of a diagonal is a quarter of the box.
 #[test]
 fn parts_are_tight() {
-    let triangles = |_: u32, see: &mut dyn FnMut([Vec3; 3])| {
-        see([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)])
-    };
+    let triangles =
+        |_: u32, see: &mut dyn FnMut([Vec3; 3])| see([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)]);
     let cell = Aabb { min: Vec3::ZERO, max: Vec3::new(0.5, 1.0, 1.0) };
     let part = clip(0, cell, &triangles).unwrap();
     assert!((part.max - Vec3::new(0.5, 0.5, 0.0005)).abs().max_element() < 1e-6, "{part:?}");

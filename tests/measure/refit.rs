@@ -1,9 +1,9 @@
 //! Trees of shapes that move are refitted: boxes hold what is below them, and work is left out where nothing has moved.
 
 use glam::Vec3;
-use skylit::accel::{Aabb, BuildPreset, build};
 use skylit::accel::refit::{RefitPlan, RefitPolicy, refit};
 use skylit::accel::wide::{self, Block, WideBvh};
+use skylit::accel::{Aabb, BuildPreset, build};
 
 const PAD: f32 = 1e-3;
 

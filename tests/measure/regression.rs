@@ -60,8 +60,7 @@ fn false_alarms_are_rare() {
     for (repeats, most) in [(3, 0.005), (7, 0.001), (32, 0.0002)] {
         let mut run = || {
             // twelve uniform numbers: nearly normal
-            let values: Vec<f64> =
-                (0..repeats).map(|_| 10.0 + (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect();
+            let values: Vec<f64> = (0..repeats).map(|_| 10.0 + (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect();
             repeated(&values)
         };
         let runs = 20_000;

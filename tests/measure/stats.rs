@@ -22,8 +22,7 @@ fn medians() {
 #[test]
 fn the_error_of_a_median() {
     // normal quantiles: the standard deviation is 2
-    let normal =
-        Percentiles { median: 5.0, p25: 5.0 - 1.349, p75: 5.0 + 1.349, count: 100, ..Percentiles::default() };
+    let normal = Percentiles { median: 5.0, p25: 5.0 - 1.349, p75: 5.0 + 1.349, count: 100, ..Percentiles::default() };
     assert!((normal.standard_error().unwrap() - 1.2533 * 2.0 / 10.0).abs() < 1e-4);
     assert_eq!(Percentiles::from_values(&[3.0]).unwrap().standard_error(), None);
     assert_eq!(Percentiles::from_values(&[3.0, 3.0]).unwrap().standard_error(), Some(0.0));

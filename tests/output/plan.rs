@@ -35,9 +35,7 @@ fn files_are_compared_by_what_they_are() {
         let (code, text) = twice(a, b).unwrap_or_else(|| panic!("{a} {b}"));
         assert!(code == 64 && text.contains("-o and --csv") && !text.contains('\n'), "{text}");
     }
-    for (a, b) in
-        [("a.png", "b.png"), ("old.png", "OLD.png"), ("a.png", "folder/a.png"), ("old.png", "dangling.png")]
-    {
+    for (a, b) in [("a.png", "b.png"), ("old.png", "OLD.png"), ("a.png", "folder/a.png"), ("old.png", "dangling.png")] {
         assert_eq!(twice(a, b), None, "{a} {b}");
     }
     // what is no file is not replaced
@@ -65,8 +63,7 @@ fn inputs_stay() {
         plan.writes("-o", at(output));
         plan
     };
-    for (output, role) in [("scene.glb", "the scene"), ("link.glb", "the scene"), ("cube/px.png", "--environment")]
-    {
+    for (output, role) in [("scene.glb", "the scene"), ("link.glb", "the scene"), ("cube/px.png", "--environment")] {
         let text = plan(output).check().unwrap_err().to_string();
         assert!(text.contains(&format!("-o would replace {role}")), "{text}");
     }
