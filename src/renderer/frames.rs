@@ -133,34 +133,22 @@ impl Renderer {
             realtime.display(&tracer, Some(frame_display(&settings, scene)))?;
         }
 
-        // Metadata of images, and the report.
-        let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings);
-        let primary = realtime.settings().primary.unwrap_or_default();
-        let preset = timeline.preset.unwrap_or_default();
-        let mut metadata = frame_metadata(&realtime_settings, options.as_ref());
-        metadata.extend([
-            ("device", format!("{} ({})", setup.device, setup.driver)),
-            ("integrator", integrator.name().into()),
-            ("preset", preset.to_string()),
-            ("primary", primary.to_string()),
-            ("scene", files::portable_name(&setup.scene)),
-            ("tracer", setup.tracer.to_string()),
-            ("version", env!("CARGO_PKG_VERSION").into()),
-        ]);
-        metadata.extend(chosen.map(|options| (CHOSEN, options)));
+        // The report, and metadata of images.
         let report = FramesReport {
             integrator,
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
-            setup,
-            preset,
+            setup: Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings),
+            preset: timeline.preset.unwrap_or_default(),
             settings: realtime_settings,
-            primary,
+            primary: realtime.settings().primary.unwrap_or_default(),
             primary_reason: realtime.primary_reason().to_owned(),
             frames: Vec::new(),
             mean: 0.0,
             brightness: None,
             seconds: Seconds::default(),
         };
+        let mut metadata = frame_metadata(&report, options.as_ref());
+        metadata.extend(chosen.map(|options| (CHOSEN, options)));
 
         // Keep the pipelines for later calls.
         self.pipelines = self.device.live_pipelines();
@@ -402,8 +390,9 @@ pub fn frame_streams(settings: &RenderSettings, realtime_settings: &Settings) ->
     }
 }
 
-/// What metadata of images say of these settings. `options`: those of frames of radiance.
-fn frame_metadata(settings: &Settings, options: Option<&PathOptions>) -> Vec<(&'static str, String)> {
+/// Metadata of the images of frames. `options`: those of frames of radiance.
+fn frame_metadata(report: &FramesReport, options: Option<&PathOptions>) -> Vec<(&'static str, String)> {
+    let FramesReport { setup, settings, .. } = report;
     let mut metadata: Vec<_> = match options {
         Some(options) => {
             let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
@@ -417,11 +406,18 @@ fn frame_metadata(settings: &Settings, options: Option<&PathOptions>) -> Vec<(&'
     };
     let filter = if settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
     metadata.extend([
+        ("device", format!("{} ({})", setup.device, setup.driver)),
         ("history", settings.history.to_string()),
+        ("integrator", report.integrator.name().into()),
         ("pixel_filter", filter.to_string()),
+        ("preset", report.preset.to_string()),
+        ("primary", report.primary.to_string()),
         ("rays_per_pixel", settings.rays_per_pixel.to_string()),
         ("resolution", settings.resolution.to_string()),
+        ("scene", files::portable_name(&setup.scene)),
         ("seed", settings.seed.to_string()),
+        ("tracer", setup.tracer.to_string()),
+        ("version", env!("CARGO_PKG_VERSION").into()),
     ]);
     metadata
 }

@@ -323,8 +323,7 @@ impl Script {
         app: &App,
         requests: &mut HostRequests,
     ) -> Result<bool, String> {
-        let elapsed = current.start.elapsed();
-        let step = current.step;
+        let (elapsed, step) = (current.start.elapsed(), current.step);
         current.step += 1;
         match &current.command {
             Command::Wait(time) => Ok(elapsed >= *time),
