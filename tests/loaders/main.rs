@@ -15,6 +15,7 @@ mod fuzz;
 mod geometry;
 mod hierarchy;
 mod image_light;
+mod light_spec;
 mod materials;
 mod memory;
 mod obj;

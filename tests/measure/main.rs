@@ -1,5 +1,6 @@
 //! What knows no device: metrics of images, temporal metrics, FLIP, statistics, the parity judge, the double-precision oracle, the sampler and its distributions, hierarchies.
 
+mod agreement;
 mod bilinear;
 mod bvh2;
 mod clip;
@@ -19,4 +20,5 @@ mod regression;
 mod sampling;
 mod stats;
 mod temporal;
+mod visits;
 mod z_test;

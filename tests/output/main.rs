@@ -4,8 +4,10 @@ mod animations;
 mod camera_numbers;
 mod exr_files;
 mod images;
+mod length;
 mod pictures;
 mod plan;
+mod settings;
 
 /// How many files a folder has.
 fn files_in(folder: &std::path::Path) -> usize {

@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod layer;
 mod panels;
 mod script;
+mod technique;
 mod views;
