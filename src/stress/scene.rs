@@ -300,6 +300,8 @@ fn positions(scene: &Scene, anatomy: &Anatomy) -> Vec<Check> {
     let mut report = |name: &str, value: f64, unit: &'static str, sentence: String| {
         out.push(Check::reported(name, value, unit).says(sentence));
     };
+
+    // Where meshes are takes bits from what they are.
     let (step, at) = anatomy.step;
     let bits = anatomy.spent_bits.floor();
     report(
@@ -318,6 +320,8 @@ fn positions(scene: &Scene, anatomy: &Anatomy) -> Vec<Check> {
             ),
         },
     );
+
+    // The scene is moved to its origin, which mends its distance and not its size.
     if let Some((lo, hi)) = scene.bounds() {
         let (origin, size) = (scene.origin(), (hi - lo).max_element());
         let before = step_at(lo.abs().max(hi.abs()).max_element());
