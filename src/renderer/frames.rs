@@ -21,7 +21,7 @@ use crate::integrators::{IntegratorName, PictureOptions};
 use crate::output::png::Colour;
 use crate::output::{Channel, Image};
 use crate::realtime::display::{Display, DisplayMode};
-use crate::realtime::frame_settings::FrameRange;
+use crate::realtime::frame_settings::{FrameRange, FrameSettings};
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::camera_path::CameraPath;
@@ -100,11 +100,7 @@ impl Renderer {
         // The motion of camera and scene.
         let size = settings.size(scene);
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
-        let motion = camera_motion(scene, path, timeline.orbit)?;
-        let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
-        let file_camera = scene.cameras.iter().position(|c| *c == camera);
-        let sequence =
-            FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
+        let sequence = frame_sequence(scene, timeline, path, &camera, fps)?;
 
         // The tracer. A single frame is one whose histories are full, not what it converges to.
         let integrator = settings.integrator();
@@ -116,14 +112,13 @@ impl Renderer {
             Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings))
         };
         let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
-        let frames = u64::from(range.end - range.first) + u64::from(warm_up);
+        let samples = (u64::from(range.end - range.first) + u64::from(warm_up))
+            .saturating_mul(u64::from(size[0]) * u64::from(size[1]));
+        let rays_per_sample = if is_radiance { integrator.get().rays_per_sample() } else { 1 };
         let request = TracerRequest {
             needs: frame_needs(&settings, &realtime_settings),
             streams: frame_streams(&settings, &realtime_settings),
-            rays: frames.saturating_mul(u64::from(size[0]) * u64::from(size[1])).saturating_mul(
-                1 + u64::from(realtime_settings.rays_per_pixel)
-                    * if is_radiance { integrator.get().rays_per_sample() } else { 1 },
-            ),
+            rays: samples.saturating_mul(1 + u64::from(realtime_settings.rays_per_pixel) * rays_per_sample),
             control: &mut *control,
             warnings: &mut warnings,
         };
@@ -142,31 +137,13 @@ impl Renderer {
         let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
-        let mut metadata = match &options {
-            Some(options) => {
-                let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
-                // samples lie where the frames have them
-                options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
-            }
-            None => {
-                let mut metadata = Vec::from(realtime_settings.occlusion.metadata());
-                metadata.push(("sequence", realtime_settings.sequence.to_string()));
-                metadata.push(("technique", realtime_settings.technique.to_string()));
-                metadata
-            }
-        };
-        let filter = if realtime_settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
+        let mut metadata = frame_metadata(&realtime_settings, options.as_ref());
         metadata.extend([
             ("device", format!("{} ({})", setup.device, setup.driver)),
-            ("history", realtime_settings.history.to_string()),
             ("integrator", integrator.name().into()),
-            ("pixel_filter", filter.to_string()),
             ("preset", preset.to_string()),
             ("primary", primary.to_string()),
-            ("rays_per_pixel", realtime_settings.rays_per_pixel.to_string()),
-            ("resolution", realtime_settings.resolution.to_string()),
             ("scene", files::portable_name(&setup.scene)),
-            ("seed", realtime_settings.seed.to_string()),
             ("tracer", setup.tracer.to_string()),
             ("version", env!("CARGO_PKG_VERSION").into()),
         ]);
@@ -425,6 +402,30 @@ pub fn frame_streams(settings: &RenderSettings, realtime_settings: &Settings) ->
     }
 }
 
+/// What metadata of images say of these settings. `options`: those of frames of radiance.
+fn frame_metadata(settings: &Settings, options: Option<&PathOptions>) -> Vec<(&'static str, String)> {
+    let mut metadata: Vec<_> = match options {
+        Some(options) => {
+            let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
+            // samples lie where the frames have them
+            options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
+        }
+        None => {
+            let others = [("sequence", settings.sequence.to_string()), ("technique", settings.technique.to_string())];
+            settings.occlusion.metadata().into_iter().chain(others).collect()
+        }
+    };
+    let filter = if settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
+    metadata.extend([
+        ("history", settings.history.to_string()),
+        ("pixel_filter", filter.to_string()),
+        ("rays_per_pixel", settings.rays_per_pixel.to_string()),
+        ("resolution", settings.resolution.to_string()),
+        ("seed", settings.seed.to_string()),
+    ]);
+    metadata
+}
+
 /// Options of the paths of frames of radiance; `None` for ambient occlusion.
 ///
 /// # Errors
@@ -502,6 +503,21 @@ pub(super) fn camera_motion(
         (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
         (None, None) => CameraMotion::Still,
     })
+}
+
+/// Scene and camera over time, as settings of frames have them.
+fn frame_sequence<'a>(
+    scene: &'a Scene,
+    timeline: &FrameSettings,
+    path: Option<CameraPath>,
+    camera: &Camera,
+    fps: f64,
+) -> Result<FrameSequence<'a>> {
+    let motion = camera_motion(scene, path, timeline.orbit)?;
+    let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
+    let file_camera = scene.cameras.iter().position(|c| c == camera);
+    let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
+    Ok(sequence.held_at(timeline.time))
 }
 
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {

@@ -1,9 +1,11 @@
 //! Files that are written: images and animations come back as they were, and a failed write leaves nothing behind.
 
 mod animations;
+mod camera_numbers;
 mod exr_files;
 mod images;
 mod pictures;
+mod plan;
 
 /// How many files a folder has.
 fn files_in(folder: &std::path::Path) -> usize {
