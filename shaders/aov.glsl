@@ -12,7 +12,7 @@ Ray ray(uint index) {
 // Writes an AovPixel.
 void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
-    Aov aov = Aov(AovParams(behind_block()).pixels);
+    Aov aov = Aov(AovParams(behind_block(0u)).pixels);
     uint at = 4u * (index - push.first);
     if (!is_hit(hit)) {
         aov.v[at] = uvec4(floatBitsToUint(INFINITY), INVALID, INVALID, INVALID);

@@ -1,6 +1,7 @@
 // gbuffer: one camera ray through each pixel's centre; stores the surface for the following passes of the frame.
 #include "ao/hemisphere.glsl"
 #include "common/frame.glsl"
+#include "interface/gbuffer.glsl"
 #include "scene/motion.glsl"
 
 Ray ray(uint index) {
@@ -11,7 +12,7 @@ void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return;
-    GbufferParams g = GbufferParams(behind_block());
+    GbufferParams g = GbufferParams(behind_block(0u));
     FrameParams f = FrameParams(g.frame);
     bool about_ns = g.hemisphere != 0u;
     uint at = image_index(f, pixel);

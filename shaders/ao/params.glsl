@@ -4,6 +4,6 @@
 #include "common/camera.glsl"
 #include "interface/ao.glsl"
 
-AoParams ao_params() { return AoParams(behind_block()); }
+AoParams ao_params() { return AoParams(behind_block(0u)); }
 
 #endif

@@ -34,13 +34,6 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Wor
 #define LOAD_QUAD(base, i) Quads(base).v[i]
 #endif
 
-// The address so many bytes behind another.
-uvec2 offset_address(uvec2 address, uint offset) {
-    uint carry;
-    uint low = uaddCarry(address.x, offset, carry);
-    return uvec2(low, address.y + carry);
-}
-
 bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
 
 // Three words of an array of such, which begins and ends at multiples of 8 bytes, as all buffers do. As two pairs they are one gather less than word by word.

@@ -10,10 +10,10 @@
 const uint NO_MEDIUM = 0xffffffffu;
 
 // The parameters of a pass of paths.
-PathParams path_params() { return PathParams(behind_block()); }
+PathParams path_params() { return PathParams(behind_block(0u)); }
 
 // Those that it has besides in frames in real time.
-PathFrameParams path_frame_params() { return PathFrameParams(offset_address(push.pass, BLOCK_PARAMS_BYTES + PATH_PARAMS_BYTES)); }
+PathFrameParams path_frame_params() { return PathFrameParams(behind_block(PATH_PARAMS_BYTES)); }
 
 // A path between two bounces, in memory a PathRecord.
 struct PathState {

@@ -15,6 +15,13 @@
 layout(buffer_reference, std430, buffer_reference_align = 64) readonly buffer Block8 { WORD64 q0, q1, q2, q3, q4, q5, q6, q7; };
 layout(buffer_reference, std430, buffer_reference_align = 32) readonly buffer Block4 { WORD64 q0, q1, q2, q3; };
 
+// The 64-bit sum is made once; the loads add constants to it.
+uvec2 offset_address(uvec2 address, uint offset) {
+    uint carry;
+    uint low = uaddCarry(address.x, offset, carry);
+    return uvec2(low, address.y + carry);
+}
+
 uvec2 block_address(uvec2 blocks, uint block) {
     uvec2 address = offset_address(blocks, block << 6);
     return uvec2(address.x, address.y + (block >> 26));

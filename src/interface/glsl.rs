@@ -315,8 +315,8 @@ mod tests {
         // a record with others in it
         assert!(!text("shading").contains("load_"));
         assert!(
-            text("block").starts_with("// Generated from")
-                && text("block").contains("#include \"interface/queue.glsl\"\n")
+            text("ao").starts_with("// Generated from")
+                && text("ao").contains("#include \"interface/queue.glsl\"\n")
         );
         assert!(text("ray").contains("layout(push_constant) uniform Push {"));
     }

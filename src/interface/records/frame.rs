@@ -85,16 +85,6 @@ records! {
         previous_position: address,
     }
 
-    /// Parameters of `gbuffer`, behind the `BlockParams`.
-    GbufferParams: Block(access: "readonly", align: 8) {
-        /// Address of the `FrameParams`.
-        frame: address,
-        /// Axis of the hemisphere: 0 the geometric normal, 1 the shading normal.
-        hemisphere: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
-    }
-
     /// An object that moved or deformed: a box around its bounds in the previous and in this frame.
     MovedRecord: Array(buffer: "MovedRecords", access: "readonly", align: 16) {
         /// Lower corner, world space relative to the scene's origin.

@@ -8,6 +8,7 @@ pub mod denoise;
 pub mod display;
 pub mod film;
 pub mod frame;
+pub mod gbuffer;
 pub mod hierarchy;
 pub mod larsen;
 pub mod lights;
@@ -25,7 +26,7 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 22] = [
+pub const FILES: [&File; 23] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
@@ -37,6 +38,7 @@ pub const FILES: [&File; 22] = [
     &lights::FILE,
     &path::FILE,
     &frame::FILE,
+    &gbuffer::FILE,
     &passes::FILE,
     &radiance::FILE,
     &larsen::FILE,

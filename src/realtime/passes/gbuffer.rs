@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams, PassParams};
 use crate::gpu::Recorder;
-use crate::interface::records::frame::GbufferParams;
+use crate::interface::records::gbuffer::GbufferParams;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Pass, Range, Stage};
