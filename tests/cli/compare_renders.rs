@@ -1,7 +1,6 @@
 //! Settings of the renders that a comparison makes on the spot.
 
 use skylit::compare::render::{add_ids, first_frame, settings};
-use skylit::integrators;
 use skylit::renderer::RenderSettings;
 
 #[test]

@@ -1,6 +1,6 @@
 //! Tables of the terminal.
 
-use skylit::report::table::{Row, Table, format_number, thousands};
+use skylit::report::{Row, Table, format_number, thousands};
 
 #[test]
 fn columns_line_up() {

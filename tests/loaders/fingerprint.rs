@@ -27,9 +27,9 @@ fn whatever_an_image_depends_on_changes_it() {
         &|s| s.instances.swap(0, 1),
         &|s| s.meshes.iter_mut().for_each(|m| m.material = 0),
         &|s| {
-            s.lights.push(crate::scene::Light {
+            s.lights.push(skylit::scene::Light {
                 name: String::new(),
-                kind: crate::scene::LightKind::Point,
+                kind: skylit::scene::LightKind::Point,
                 intensity: Vec3::ONE,
                 position: glam::DVec3::ZERO,
                 direction: glam::DVec3::Y,
@@ -38,7 +38,7 @@ fn whatever_an_image_depends_on_changes_it() {
         },
         &|s| {
             let edges = [glam::DVec3::X, glam::DVec3::Z];
-            s.portals.push(crate::scene::Portal { corner: glam::DVec3::ZERO, edges });
+            s.portals.push(skylit::scene::Portal { corner: glam::DVec3::ZERO, edges });
         },
         &|s| {
             let mesh = s.meshes.iter_mut().find_map(|m| match &mut m.geometry {

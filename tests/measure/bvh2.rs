@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use skylit::accel::bvh2::{Bvh2, EMPTY, inner_node, rebase};
-use skylit::accel::{Aabb, BuildPreset, build};
+use skylit::accel::{Aabb, BuildPreset};
 use skylit::interface::records::hierarchy::AXIS_SHIFT;
 
 fn boxes(n: usize, place: impl Fn(usize) -> Vec3, size: impl Fn(usize) -> f32) -> Vec<Aabb> {

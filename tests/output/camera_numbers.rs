@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use serde_json::{Value, json};
-use skylit::renderer::camera_numbers::{matrices, metadata, pose, settings};
+use skylit::renderer::camera_numbers::{matrices, metadata, settings};
 use skylit::scene::{Camera, Projection};
 
 #[test]
