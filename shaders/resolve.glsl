@@ -2,10 +2,9 @@
 #define FilmPixel ScalarFilmPixel
 #define Film ScalarFilm
 #include "common/film.glsl"
-#include "interface/ao.glsl"
 
 bool add_sample(inout FilmPixel pixel, FilmParams p, uint k) {
-    float visibility = Floats(AoParams(p.integrator).samples).v[k];
+    float visibility = Floats(p.samples).v[k];
     // a sample without a hit counts as 0
     if (visibility < 0.0) return false;
     add_value(pixel, 0u, visibility);

@@ -49,8 +49,8 @@ layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer St
 
 // Ambient visibility of a path's first surface, if that darkens all of its light; `radiance` counts in its fourth number the camera ray's hit, and the occlusion ray that met
 // nothing.
-float occluded_share(PathParams p, vec4 radiance) {
-    return p.occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
+float occluded_share(uint occludes_all, vec4 radiance) {
+    return occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
 }
 
 // The parts of a SignalRecord, a vector each.

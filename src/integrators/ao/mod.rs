@@ -276,7 +276,7 @@ impl Estimator for AoEstimator {
             [own.ray_dump, own.occlusion_dump] = [dumps[0].address(), dumps[1].address()];
         }
         self.params.write(block, &own)?;
-        let film = FilmParams { film, integrator: self.params.own_address() };
+        let film = FilmParams { film, samples: self.own.samples, ..Default::default() };
         self.film.write(0, bytemuck::bytes_of(&film))?;
         Ok(self.params.address())
     }

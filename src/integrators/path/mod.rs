@@ -593,7 +593,8 @@ impl Estimator for PathEstimator {
 
     fn begin(&mut self, block: &BlockParams, film: u64, _: bool) -> Result<u64> {
         self.write_block(block)?;
-        let film = FilmParams { film, integrator: self.params[0].own_address() };
+        let PathParams { radiance, occludes_all, .. } = self.records[0].path;
+        let film = FilmParams { film, samples: radiance, occludes_all, ..Default::default() };
         self.film.write(0, bytemuck::bytes_of(&film))?;
         Ok(self.params[0].address())
     }
