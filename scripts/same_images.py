@@ -36,6 +36,7 @@ STILLS: list[tuple[str, str, str]] = [
     ("path-courtyard", "scenes/courtyard.gltf", "--integrator path --spp 4 --environment 1,1.1,1.3"),
     ("direct", "builtin:cornell-box", "--integrator direct --spp 8"),
     ("ao-sky", "builtin:stairs", "--integrator ao-sky --spp 8"),
+    ("lit", "builtin:cornell-spheres", "--integrator lit --spp 4 --ao-radius 2 --ao-falloff 1.5"),
 ]
 COMPUTE_ONLY: list[tuple[str, str, str]] = [
     *[(f"traversal-{k}", "builtin:stairs", f"--spp 4 --traversal {k}") for k in ["wide", "packet", "nearest", "direction", "brute"]],
@@ -67,6 +68,10 @@ FRAMES: list[tuple[str, str, str]] = [
     *[(f"filter-{k}", "builtin:stairs", f"--preset fast --filter {k} --frames 0..4") for k in ["none", "atrous"]],
     ("bent", "builtin:stairs", "--preset fast --aov bent --frames 0..4"),
     ("raster", "builtin:stairs", "--preset fast --primary raster --frames 0..4"),
+    ("at-rest", "builtin:stairs", "--preset balanced --antialias on --at-rest converge --frames 0..24"),
+    ("frames-path", "builtin:cornell-glass-sphere", "--integrator path --preset balanced --frames 0..6"),
+    ("frames-lit", "builtin:cornell-spheres", "--integrator lit --ao-radius 2 --preset fast --frames 0..4"),
+    ("frames-moving", "builtin:parade", "--integrator path --preset fast --animate --frames 0..4"),
 ]
 
 

@@ -1,5 +1,6 @@
 // aov: one ray through each pixel's centre; writes the AOVs of its hit.
 #include "common/camera.glsl"
+#include "interface/aov.glsl"
 #include "scene/surface.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer Aov { uvec4 v[]; };
@@ -11,7 +12,7 @@ Ray ray(uint index) {
 // Writes an AovPixel.
 void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
-    Aov aov = Aov(p.aov);
+    Aov aov = Aov(AovParams(behind_block(0u)).pixels);
     uint at = 4u * (index - push.first);
     if (!is_hit(hit)) {
         aov.v[at] = uvec4(floatBitsToUint(INFINITY), INVALID, INVALID, INVALID);

@@ -137,7 +137,7 @@ void main() {
             }
         }
     }
-    uvec2 list = offset_address(p.entry_points, k * ENTRY_LIST_BYTES);
+    uvec2 list = offset_address(ao_params().entry_points, k * ENTRY_LIST_BYTES);
     FOR_ENTRIES {
         if (i <= count) STORE_PAIR(list, i, uvec2(block[i], distance_[i]));
     }

@@ -12,7 +12,7 @@ void closest(uint index, Hit hit) {
     PathState state = load_state(p, index);
     if (HAS_COVERAGE) {
         uvec2 pixel = path_pixel(block, state.index);
-        next_ray_seed = ray_seed(block.seed, pixel, path_sample(block, state.index), state.depth + state.passes + 1u);
+        next_ray_seed = ray_seed(block.seed, pixel, path_sample(state.index), state.depth + state.passes + 1u);
     }
     vec3 share = vec3(0.0);
     if (WITH_SIGNAL) share = arrived_share(p, k, hit);

@@ -17,25 +17,26 @@ Ray lens_ray(BlockParams p, Ray r, vec2 u) {
 }
 
 Ray camera_sample(BlockParams p, uint index) {
-    if (!in_block(p, block_pixel(p, path_cell(p, index)))) return no_ray();
+    if (!in_block(p, block_pixel(p, path_cell(index)))) return no_ray();
     uvec2 pixel = path_pixel(p, index);
     if (WITH_SIGNAL && any(greaterThanEqual(pixel, p.image_size))) return no_ray();
-    vec2 u = sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_FILM);
+    vec2 u = sample_2d(p.seed, pixel, path_sample(index), CAMERA_FILM);
     // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest, where a frame has several, each has a place of its own, as in a still.
     vec2 offset = WITH_SIGNAL && p.pixel_filter == FILTER_CENTRE ? p.centre_offset : !WITH_SIGNAL && WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
     Ray r = unclipped_camera_ray(p, vec2(pixel) + 0.5 + offset);
-    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(p, index), 0u));
-    if (WITH_LENS) r = lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_LENS));
+    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(index), 0u));
+    if (WITH_LENS) r = lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(index), CAMERA_LENS));
     return clip_ray(p, r);
 }
 
 // Where it has been traced for the G-buffer.
 Hit known_hit(uint index) {
     BlockParams p = BlockParams(push.pass);
-    if (!in_block(p, block_pixel(p, path_cell(p, index)))) return miss();
+    if (!in_block(p, block_pixel(p, path_cell(index)))) return miss();
     uvec2 pixel = path_pixel(p, index);
     if (any(greaterThanEqual(pixel, p.image_size))) return miss();
-    return load_known_hit(p.known_hits, image_index(FrameParams(p.frame), pixel));
+    PathFrameParams f = path_frame_params();
+    return load_known_hit(f.known_hits, image_index(FrameParams(f.frame), pixel));
 }
 
 Ray ray(uint index) {
@@ -60,7 +61,7 @@ void closest(uint index, Hit hit) {
         // clipping planes hide surfaces, not what the camera is in
         state.throughput *= transmittance(state.medium, clipped_length(p, r.direction));
     }
-    if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), path_sample(p, index), 1u);
+    if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), path_sample(index), 1u);
     vec3 seen = path_vertex(p, k, state, r, hit);
     float covered = is_hit(hit) ? 1.0 : 0.0;
     if (WITH_SIGNAL) {

@@ -7,7 +7,7 @@ Ray ray(uint index) {
 
 // What a sample leaves in its path's memory: the reflectance of its surface, and the distance; infinite if nothing was hit.
 void closest(uint index, Hit hit) {
-    PathParams p = PathParams(BlockParams(push.pass).path);
+    PathParams p = path_params();
     uint k = Words(p.shadow.tags).v[index];
     store_quad(p.radiance, k, vec4(load_quad(p.contributions, index).rgb, hit.t));
 }

@@ -53,7 +53,7 @@ void main() {
         uint i = p.first_path + k * n + s;
         vec4 direct = load_signal(path, i, SIGNAL_DIRECT), d = load_signal(path, i, SIGNAL_DIFFUSE), albedo = load_signal(path, i, SIGNAL_ALBEDO);
         vec4 radiance = load_quad(path.radiance, i);
-        float share = occluded_share(path, radiance);
+        float share = occluded_share(path.occludes_all, radiance);
         vec3 c = share * radiance.rgb;
         d.rgb *= share;
         if (!is_finite(c) || !is_finite(d.rgb) || !is_finite(direct.rgb)) continue;

@@ -7,6 +7,6 @@ Ray ray(uint index) {
 
 void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
-    SurfacesParams q = SurfacesParams(p.surfaces);
+    SurfacesParams q = SurfacesParams(behind_block(0u));
     guide_vertex(p, Words(q.tags).v[index], load_guide_ray(q, index), load_ray(push.rays, index - push.first), hit);
 }

@@ -4,10 +4,9 @@
 #include "common/film.glsl"
 #include "path/params.glsl"
 
-bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
-    PathParams path = path_params();
-    vec4 sample_ = load_quad(path.radiance, k);
-    sample_.rgb *= occluded_share(path, sample_);
+bool add_sample(inout FilmPixel pixel, FilmParams p, uint k) {
+    vec4 sample_ = load_quad(p.samples, k);
+    sample_.rgb *= occluded_share(p.occludes_all, sample_);
     // also false for NaN
     if (!(max(abs(sample_.r), max(abs(sample_.g), abs(sample_.b))) < 1e30)) {
         pixel.not_finite++;

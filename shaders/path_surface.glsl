@@ -13,5 +13,5 @@ void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return;
-    guide_vertex(p, image_index(FrameParams(p.frame), pixel), GUIDE_START, centre_ray(p, index), hit);
+    guide_vertex(p, image_index(FrameParams(SurfacesParams(behind_block(0u)).frame), pixel), GUIDE_START, centre_ray(p, index), hit);
 }

@@ -1,6 +1,7 @@
 // primary: camera rays, jittered within their pixels; where one meets the scene, the occlusion rays that leave from there are appended to
 // the queue, one for each sample that shares the camera ray (ao/sample.glsl). A sample without a hit has no further cost.
 #include "ao/hemisphere.glsl"
+#include "ao/params.glsl"
 #include "ao/sample.glsl"
 #include "common/entry_points.glsl"
 #include "common/pixel_filter.glsl"
@@ -17,12 +18,12 @@
 // Address of the list for the packet of rays that begins at an index, or null: the root. A packet has a list if its pixels are in one bundle. The host writes no lists for
 // launches of so few samples that none is.
 uvec2 entry_list(uint index) {
-    uvec2 lists = BlockParams(push.pass).entry_points;
+    uvec2 lists = ao_params().entry_points;
     bool has_list = !is_null(lists) && bundle_of(index) == bundle_of(index + SUBGROUP_SIZE * PACKET_RAYS - 1u);
     return has_list ? offset_address(lists, (bundle_of(index) - first_bundle()) * ENTRY_LIST_BYTES) : uvec2(0u);
 }
 
-uvec2 queue_counter() { return BlockParams(push.pass).queue.count; }
+uvec2 queue_counter() { return ao_params().queue.count; }
 
 // The first of the places in the queue of the rays that the next hit adds.
 uint claimed_slot = 0u;
@@ -37,7 +38,7 @@ Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
-    vec2 u = sample_2d(p.seed, pixel, first_sample(index) >> p.camera_shift, CAMERA_FILM);
+    vec2 u = sample_2d(p.seed, pixel, first_sample(index) >> ao_params().camera_shift, CAMERA_FILM);
     if (p.pixel_filter != FILTER_BOX) u = 0.5 + filter_offset(p.pixel_filter, u);
     return camera_ray(p, vec2(pixel) + u);
 }
@@ -45,20 +46,22 @@ Ray camera_sample(BlockParams p, uint index) {
 Ray ray(uint index) {
     BlockParams p = BlockParams(push.pass);
     Ray r = camera_sample(p, index);
-    dump_ray(p.ray_dump, index, r);
+    dump_ray(ao_params().ray_dump, index, r);
     return r;
 }
 
 void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
+    AoParams ao = ao_params();
+    bool about_ns = ao.occlusion.hemisphere != 0u;
     if (!is_hit(hit)) {
-        dump_ray(p.occlusion_dump, index, no_ray());
+        dump_ray(ao.occlusion_dump, index, no_ray());
         return;
     }
     Surface s;
 #ifdef TAKES_TRACER_HITS
     // A geometric normal that is turned to the viewer follows from the corners alone, unless the surface is seen exactly from the side.
-    bool needs_submesh = !SINGLE_LEVEL || HAS_SPHERES || p.hemisphere != 0u;
+    bool needs_submesh = !SINGLE_LEVEL || HAS_SPHERES || about_ns;
     if (!needs_submesh) {
         s = surface_of_corners(hit);
         needs_submesh = !(abs(dot(s.ng, view_direction(p, s.position))) > 0.0);
@@ -71,18 +74,18 @@ void closest(uint index, Hit hit) {
         // the point on a triangle follows from its corners; only a sphere needs the ray again
         s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
     }
-    Hemisphere h = hemisphere_at(p, s);
+    Hemisphere h = hemisphere_at(p, s, about_ns);
     uvec2 pixel = block_pixel(p, pixel_index(index)) + p.block_origin;
     uint first = first_sample(index), tag = (index - push.first) << push.shared_bits;
     for (uint k = 0u; k < 1u << push.shared_bits; k++) {
         vec3 w = to_world(h.axis, cosine_hemisphere(sample_2d(p.seed, pixel, first + k, AO_DIRECTION)));
-        Ray r = occlusion_ray(s.position, s.offset, h.ng, w, p.radius);
+        Ray r = occlusion_ray(s.position, s.offset, h.ng, w, ao.occlusion.reach);
         // rays are kept of launches in which no samples share a camera ray
-        dump_ray(p.occlusion_dump, index, r);
+        dump_ray(ao.occlusion_dump, index, r);
 #ifdef APPENDS_RAYS_PER_HIT
-        store_in_queue(p.queue, claimed_slot + k, r, tag + k);
+        store_in_queue(ao.queue, claimed_slot + k, r, tag + k);
 #else
-        append_ray(p.queue, r, tag + k);
+        append_ray(ao.queue, r, tag + k);
 #endif
     }
 }

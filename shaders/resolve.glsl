@@ -3,7 +3,7 @@
 #define Film ScalarFilm
 #include "common/film.glsl"
 
-bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
+bool add_sample(inout FilmPixel pixel, FilmParams p, uint k) {
     float visibility = Floats(p.samples).v[k];
     // a sample without a hit counts as 0
     if (visibility < 0.0) return false;

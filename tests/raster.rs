@@ -10,10 +10,10 @@ use bytemuck::Zeroable;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
-use skylit::film::block::{Block, BlockParams};
+use skylit::film::block::{Block, PassParams};
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::{Buffer, Commands, Device, Memory};
-use skylit::integrators::aov::{self, AovPixel};
+use skylit::integrators::aov::{self, AovParams, AovPixel};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::raster::{DrawStats, Primary, Raster, View};
@@ -487,8 +487,9 @@ fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovP
     let device = tracer.device();
     let count = seen.block.rays();
     let target = Buffer::new(device, "outputs", 64 * count as u64, Memory::Readback).unwrap();
-    let params = BlockParams { aov: target.address(), ..seen.block.params(seen.image_size, &seen.camera, 0) };
-    let params = Buffer::from_slice(device, "block parameters", &[params]).unwrap();
+    let mut params = PassParams::new(device, "parameters of outputs").unwrap();
+    let block = seen.block.params(seen.image_size, &seen.camera, 0);
+    params.write(&block, &AovParams { pixels: target.address() }).unwrap();
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
     let mut drawn = None;
     let timings =

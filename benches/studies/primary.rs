@@ -11,9 +11,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 use skylit::accel::flatten::FlatScene;
-use skylit::film::block::{Block, BlockParams};
+use skylit::film::block::{Block, PassParams};
 use skylit::film::camera::{CameraRecord, Choice, choose};
 use skylit::gpu::{Buffer, Commands, Device, Memory, Options};
+use skylit::integrators::aov::AovParams;
 use skylit::raster::{Raster, View};
 use skylit::scene::{Scene, builtin, load};
 use skylit::tracer::stream::LAUNCH_RAYS;
@@ -86,8 +87,8 @@ fn measure(
     let block = Block::cut(size)[0];
     let count = block.rays();
     let target = Buffer::new(device, "outputs", 64 * count as u64, Memory::Device)?;
-    let params = BlockParams { aov: target.address(), ..block.params(size, &camera, 0) };
-    let params = Buffer::from_slice(device, "block parameters", &[params])?;
+    let mut params = PassParams::new(device, "parameters of outputs")?;
+    params.write(&block.params(size, &camera, 0), &AovParams { pixels: target.address() })?;
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
     let stream = tracer.stream(&shaders::AOV_CLOSEST)?;
     let raster = device.info.can_rasterise().then(|| Raster::new(tracer, &shaders::AOV_CLOSEST, size)).transpose()?;

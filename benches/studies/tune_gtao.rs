@@ -9,6 +9,7 @@
 use skylit::accel::flatten::FlatScene;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::{Device, Options};
+use skylit::integrators::ao::Occlusion;
 use skylit::measure::metrics::ImagePair;
 use skylit::output::parse_size;
 use skylit::raster::Primary;
@@ -119,8 +120,11 @@ impl Tuner {
             let camera = CameraRecord::new(&orbit.camera_at(&camera, 15.0 * f64::from(turn)), scene.origin(), aspect);
             for radius in RADII.map(|r| r * diagonal) {
                 for (radius, falloff) in [(radius, 1.0), (f64::INFINITY, 1000f64.powf(1.0 / radius))] {
-                    let settings =
-                        Settings { radius, falloff, primary: Some(Primary::Traced), ..Preset::Balanced.settings() };
+                    let settings = Settings {
+                        occlusion: Occlusion::new(radius, falloff),
+                        primary: Some(Primary::Traced),
+                        ..Preset::Balanced.settings()
+                    };
                     self.add_view(camera, settings, arguments.rays)?;
                 }
             }
@@ -131,9 +135,8 @@ impl Tuner {
     fn add_view(&mut self, camera: CameraRecord, settings: Settings, rays: u32) -> Result<()> {
         let scene = self.tracers.len() - 1;
         let tracer = &self.tracers[scene].1;
-        let Settings { radius, falloff, primary, .. } = settings;
-        let truth =
-            Settings { radius, falloff, primary, rays_per_pixel: rays, seed: 77, ..Preset::Reference.settings() };
+        let Settings { occlusion, primary, .. } = settings;
+        let truth = Settings { occlusion, primary, rays_per_pixel: rays, seed: 77, ..Preset::Reference.settings() };
         let mut realtime = Realtime::new(tracer, self.size, &truth, &[])?;
         realtime.frame(tracer, &camera, &[])?;
         let (reference, coverage) = (realtime.result()?, realtime.coverage()?);

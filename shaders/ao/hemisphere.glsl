@@ -9,11 +9,12 @@ struct Hemisphere {
     vec3 axis;  // axis of the hemisphere: ng, or the shading normal on the side of ng
 };
 
-Hemisphere hemisphere_at(BlockParams p, Surface s) {
+// about_ns: its axis is the shading normal.
+Hemisphere hemisphere_at(BlockParams p, Surface s, bool about_ns) {
     float facing = dot(s.ng, view_direction(p, s.position)) > 0.0 ? -1.0 : 1.0;
     vec3 ng = facing * s.ng;
     // ns is on the side of ng
-    return Hemisphere(ng, p.hemisphere != 0u ? facing * s.ns : ng);
+    return Hemisphere(ng, about_ns ? facing * s.ns : ng);
 }
 
 #endif

@@ -17,6 +17,14 @@ uint sample_index(uint ray_index) {
     return push.sample_index + (ray_index & ((1u << push.sample_bits) - 1u));
 }
 
+// Address of what a pass reads besides the parameters of its block: it lies behind those, `offset` bytes from their end. It follows from push constants alone, so a CPU driver
+// reads from there once for all lanes (src/shaders/specialize/uniform.rs).
+uvec2 behind_block(uint offset) {
+    uint carry;
+    uint low = uaddCarry(push.pass.x, BLOCK_PARAMS_BYTES + offset, carry);
+    return uvec2(low, push.pass.y + carry);
+}
+
 // The pixel in the block of a ray index.
 uvec2 block_pixel(BlockParams p, uint pixel) {
     uint tile = pixel >> 6;

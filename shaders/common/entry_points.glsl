@@ -1,7 +1,7 @@
 // Bundles of neighbouring pixels, whose camera rays start traversal at the same entry points (entry_points.glsl).
 #ifndef COMMON_ENTRY_POINTS
 #define COMMON_ENTRY_POINTS
-#include "common/camera.glsl"
+#include "ao/params.glsl"
 
 uint bundle_of(uint ray_index) { return pixel_index(ray_index) >> BUNDLE_BITS; }
 

@@ -24,12 +24,12 @@ void add_value(inout FilmPixel pixel, uint channel, float value) {
 }
 
 // Adds sample k of the launch to its pixel. Returns whether that changed the pixel.
-bool add_sample(inout FilmPixel pixel, BlockParams p, uint k);
+bool add_sample(inout FilmPixel pixel, FilmParams p, uint k);
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= push.count >> push.sample_bits) return;
-    BlockParams p = BlockParams(push.pass);
+    FilmParams p = FilmParams(push.pass);
     Film film = Film(p.film);
     uint at = pixel_index(push.first) + k;
     FilmPixel pixel = film.v[at];

@@ -13,11 +13,11 @@ vec3 ambient_reflectance(Surface s, Shading m, float log_side) {
 
 // The occlusion ray of a sample (ao/sample.glsl). With falloff c its length is random, longer than d with probability c^-d: a hit at distance d then occludes by
 // c^-d on average, and any hit will do.
-Ray ambient_ray(BlockParams block, Surface s, vec3 ng, uvec2 pixel, uint n) {
-    vec3 axis = block.hemisphere == 0u ? ng : dot(s.ng, ng) < 0.0 ? -s.ns : s.ns;
+Ray ambient_ray(BlockParams block, OcclusionRecord o, Surface s, vec3 ng, uvec2 pixel, uint n) {
+    vec3 axis = o.hemisphere == 0u ? ng : dot(s.ng, ng) < 0.0 ? -s.ns : s.ns;
     vec3 w = to_world(axis, cosine_hemisphere(sample_2d(block.seed, pixel, n, AO_DIRECTION)));
-    float reach = block.radius;
-    if (block.falloff_log2 > 0.0) reach = min(reach, -log2(1.0 - sample_2d(block.seed, pixel, n, AO_LENGTH).x) / block.falloff_log2);
+    float reach = o.reach;
+    if (o.falloff_log2 > 0.0) reach = min(reach, -log2(1.0 - sample_2d(block.seed, pixel, n, AO_LENGTH).x) / o.falloff_log2);
     return occlusion_ray(s.position, s.offset, ng, w, reach);
 }
 

@@ -75,9 +75,9 @@ void list_surface(FrameParams f, SurfacesParams q, uint at, bool is_uncovered) {
 
 // One vertex of a pixel's ray: writes the G-buffer, or continues.
 void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
-    FrameParams f = FrameParams(block.frame);
-    SurfacesParams q = SurfacesParams(block.surfaces);
-    PathParams p = PathParams(block.path);
+    SurfacesParams q = SurfacesParams(behind_block(0u));
+    FrameParams f = FrameParams(q.frame);
+    PathParams p = PathParams(q.path);
     if (g.bounces == 0u && !is_null(q.known_hits)) store_known_hit(q.known_hits, at, hit);
     if (!is_hit(hit)) {
         // behind mirrors the last one is what the pixel shows

@@ -9,13 +9,11 @@
 
 const uint NO_MEDIUM = 0xffffffffu;
 
-// The parameters of a pass of paths. They lie behind those of its block: their address then follows from push constants alone, and a CPU driver reads them once for all lanes
-// (src/shaders/specialize/uniform.rs).
-PathParams path_params() {
-    uint carry;
-    uint low = uaddCarry(push.pass.x, BLOCK_PARAMS_BYTES, carry);
-    return PathParams(uvec2(low, push.pass.y + carry));
-}
+// The parameters of a pass of paths.
+PathParams path_params() { return PathParams(behind_block(0u)); }
+
+// Those that it has besides in frames in real time.
+PathFrameParams path_frame_params() { return PathFrameParams(behind_block(PATH_PARAMS_BYTES)); }
 
 // A path between two bounces, in memory a PathRecord.
 struct PathState {
@@ -51,8 +49,8 @@ layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer St
 
 // Ambient visibility of a path's first surface, if that darkens all of its light; `radiance` counts in its fourth number the camera ray's hit, and the occlusion ray that met
 // nothing.
-float occluded_share(PathParams p, vec4 radiance) {
-    return p.occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
+float occluded_share(uint occludes_all, vec4 radiance) {
+    return occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
 }
 
 // The parts of a SignalRecord, a vector each.

@@ -110,7 +110,7 @@ void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state,
     // where nothing is to be darkened, as on mirrors, a ray that meets nothing
     bool is_darkened = is_needed || has_rough_part(m.bsdf);
     Ray r = no_ray();
-    if (is_darkened) r = ambient_ray(block, s, m.ng, pixel, n);
+    if (is_darkened) r = ambient_ray(block, p.occlusion, s, m.ng, pixel, n);
     uint slot = append_ray(p.ambient, r, k);
     c = counted_radiance(p, c, state.depth + 1u);
     // the ray is counted where all light is darkened by what it meets (occluded_share)
@@ -223,7 +223,7 @@ void scatter_path(BlockParams block, PathParams p, uint k, PathState state, Ray 
 vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     PathParams p = path_params();
     uvec2 pixel = path_pixel(block, state.index);
-    uint n = path_sample(block, state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
+    uint n = path_sample(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     if (scatters(state.medium)) {
         FreeFlight flight = free_flight(state.medium, state.throughput, hit.t, sample_2d(block.seed, pixel, n, dimension + FREE_FLIGHT));
         state.throughput *= flight.weight;

@@ -19,13 +19,15 @@ struct SignalVertex {
 const uint LISTED_SAMPLES = 0x80000000u;
 
 // Number of a path's pixel in the block. The pixels beyond the block's are of listed ones.
-uint path_cell(BlockParams p, uint ray_index) {
+uint path_cell(uint ray_index) {
     uint pixel = pixel_index(ray_index);
+    PathFrameParams p = path_frame_params();
     return WITH_SIGNAL && pixel >= p.cells ? Words(p.listed).v[pixel - p.cells >> p.listed_bits] : pixel;
 }
 
 // The index of a path in the sequence of its pixel.
-uint path_sample(BlockParams p, uint ray_index) {
+uint path_sample(uint ray_index) {
+    PathFrameParams p = path_frame_params();
     if (!WITH_SIGNAL || pixel_index(ray_index) < p.cells) return sample_index(ray_index);
     uint bits = p.listed_bits + push.sample_bits, k = ray_index - (p.cells << push.sample_bits);
     return LISTED_SAMPLES | (push.sample_index << bits) + (k & (1u << bits) - 1u);
@@ -33,8 +35,8 @@ uint path_sample(BlockParams p, uint ray_index) {
 
 // The pixel of the image that a path belongs to. Frames in real time count the pixels that are sampled in a frame alone, so that neighbouring rays are of pixels that are close to each other.
 uvec2 path_pixel(BlockParams p, uint ray_index) {
-    uvec2 pixel = block_pixel(p, path_cell(p, ray_index)) + p.block_origin;
-    return WITH_SIGNAL ? sampled_pixel(FrameParams(p.frame), pixel) : pixel;
+    uvec2 pixel = block_pixel(p, path_cell(ray_index)) + p.block_origin;
+    return WITH_SIGNAL ? sampled_pixel(FrameParams(path_frame_params().frame), pixel) : pixel;
 }
 
 // Of light reflected by the BSDF's value f: the diffuse part divided by the albedo. w: its direction in the world.

@@ -191,41 +191,8 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     }
 
     // geometry and surfaces
-    let instanced = if i.triangles == i.unique_triangles {
-        String::new()
-    } else {
-        format!(" ({} unique)", grouped(i.unique_triangles))
-    };
-    let spheres = if i.spheres > 0 { format!(", {}", counted(i.spheres, "sphere", "spheres")) } else { String::new() };
-    add(
-        "geometry",
-        format!(
-            "{}{instanced}{spheres}; {} of {}",
-            counted(i.triangles, "triangle", "triangles"),
-            counted(i.instances as u64, "instance", "instances"),
-            counted(i.meshes as u64, "mesh", "meshes")
-        ),
-    );
-
-    let edges = if i.open_edges > 0 {
-        format!(
-            "{}; {} of {} meshes are closed",
-            counted(i.open_edges, "open edge, where a surface ends", "open edges, where surfaces end"),
-            i.closed_meshes,
-            i.meshes
-        )
-    } else {
-        "no open edges".to_owned()
-    };
-    let dropped = if i.degenerate_triangles > 0 {
-        format!(
-            "; {} dropped",
-            counted(i.degenerate_triangles as u64, "degenerate triangle was", "degenerate triangles were")
-        )
-    } else {
-        String::new()
-    };
-    add("surfaces", format!("{edges}{dropped}"));
+    add("geometry", geometry_text(i));
+    add("surfaces", surfaces_text(i));
     scene.report.remarks().into_iter().for_each(|remark| add("vertices", remark));
 
     // materials and textures
@@ -280,6 +247,33 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         add("extensions", extensions.iter().map(noted).collect::<Vec<_>>().join(", "));
     }
     lines
+}
+
+/// Numbers of primitives, and how they are instanced.
+fn geometry_text(i: &Inventory) -> String {
+    let mut primitives = counted(i.triangles, "triangle", "triangles");
+    if i.triangles != i.unique_triangles {
+        primitives += &format!(" ({} unique)", grouped(i.unique_triangles));
+    }
+    if i.spheres > 0 {
+        primitives += &format!(", {}", counted(i.spheres, "sphere", "spheres"));
+    }
+    let instances = counted(i.instances as u64, "instance", "instances");
+    format!("{primitives}; {instances} of {}", counted(i.meshes as u64, "mesh", "meshes"))
+}
+
+/// Where surfaces end, and triangles that were dropped.
+fn surfaces_text(i: &Inventory) -> String {
+    let mut text = "no open edges".to_owned();
+    if i.open_edges > 0 {
+        let edges = counted(i.open_edges, "open edge, where a surface ends", "open edges, where surfaces end");
+        text = format!("{edges}; {} of {} meshes are closed", i.closed_meshes, i.meshes);
+    }
+    if i.degenerate_triangles > 0 {
+        let dropped = counted(i.degenerate_triangles as u64, "degenerate triangle was", "degenerate triangles were");
+        text += &format!("; {dropped} dropped");
+    }
+    text
 }
 
 fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(Suggestions, OnDevice)> {

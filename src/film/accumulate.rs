@@ -35,11 +35,12 @@ pub(crate) trait Estimator {
         false
     }
 
-    /// Prepares the launches of a batch and returns the device address of the pass's parameters.
-    /// `keep`: the batch is the first sample and [`Estimator::keeps_first`] is true.
-    fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64>;
+    /// Prepares the launches of a batch of a block, which add to the pixels at the device address
+    /// `film`, and returns the address of the pass's parameters. `keep`: the batch is the first
+    /// sample and [`Estimator::keeps_first`] is true.
+    fn begin(&mut self, block: &BlockParams, film: u64, keep: bool) -> Result<u64>;
 
-    /// Runs launches in order, which add to the film of the parameters; with `keep` it is one.
+    /// Runs launches in order, which add to the film; with `keep` it is one.
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>>;
 }
 
@@ -129,8 +130,7 @@ impl Batch {
     }
 }
 
-/// Accumulates the samples of an image. `params`: the estimator's own block parameters; what
-/// follows from camera, samples and film is filled in.
+/// Accumulates the samples of an image.
 ///
 /// When `control` requests a stop, only complete samples are kept, so that all pixels of a tile
 /// have the same count. The batch in progress is abandoned for that, unless the pixels have no
@@ -142,7 +142,6 @@ pub(crate) fn accumulate<E: Estimator>(
     tracer: &Tracer,
     camera: &CameraRecord,
     samples: &SampleSettings,
-    params: &BlockParams,
     estimator: &mut E,
     control: &mut dyn Control,
 ) -> Result<Accumulated> {
@@ -184,7 +183,7 @@ pub(crate) fn accumulate<E: Estimator>(
     };
     let rates = vec![Rate::default(); blocks.len()];
     let displayed = options.display_target.map(|target| DisplayErrors::new(target, &out.film));
-    let mut run = Run { launcher, camera, samples, params, start, blocks, rates, tile_samples, displayed, out };
+    let mut run = Run { launcher, camera, samples, start, blocks, rates, tile_samples, displayed, out };
     let mut next = options.next(samples.spp, &run.tile_samples, &|| run.open_tiles());
     while let Some(step) = next {
         let most = run.tile_samples.iter().copied().max().unwrap_or(0);
@@ -223,7 +222,6 @@ struct Run<'a, E> {
     launcher: Launcher<'a, E>,
     camera: &'a CameraRecord,
     samples: &'a SampleSettings,
-    params: &'a BlockParams,
     start: Instant,
     blocks: Vec<Block>,
     // sampling rate of each block
@@ -347,7 +345,7 @@ impl<E: Estimator> Run<'_, E> {
     /// Uploads a tile group with the current sums of its pixels.
     fn pixel_batch(&mut self, group: &TileGroup) -> Result<PixelBatch> {
         let device = self.launcher.tracer.device();
-        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.samples, self.params, E::CHANNELS)?;
+        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.samples, E::CHANNELS)?;
         let record = record_bytes(E::CHANNELS);
         match &self.out.state {
             Some(state) if group.first > 0 => {
@@ -458,7 +456,7 @@ impl<E: Estimator> Launcher<'_, E> {
         control: &mut dyn Control,
         report: &mut dyn FnMut(f64, &mut dyn Control),
     ) -> Result<Option<Batch>> {
-        let pass = self.estimator.begin(pixel_batch.params, keep)?;
+        let pass = self.estimator.begin(&pixel_batch.params, pixel_batch.film.address(), keep)?;
         pixel_batch.save(&mut self.commands, batch)?;
         let (mut first, mut restarted) = (0u64, false);
         while first < (pixel_batch.pixels as u64) << batch.bits {
@@ -514,7 +512,6 @@ impl PixelBatch {
         group: &TileGroup,
         camera: &CameraRecord,
         samples: &SampleSettings,
-        params: &BlockParams,
         channels: usize,
     ) -> Result<Self> {
         let tiles = group.traced.clone();
@@ -525,10 +522,9 @@ impl PixelBatch {
             None => None,
         };
         let params = BlockParams {
-            film: film.address(),
             tiles: tile_buffer.as_ref().map_or(0, Buffer::address),
             pixel_filter: samples.pixel_filter as u32,
-            ..params.at(&group.block, samples.size, camera, samples.seed)
+            ..group.block.params(samples.size, camera, samples.seed)
         };
         Ok(Self { params, tiles, pixels, film, before: None, _tile_buffer: tile_buffer })
     }

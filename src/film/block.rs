@@ -1,7 +1,12 @@
 //! Blocks of the image: the pixels of one set of device buffers, which does not grow with the
 //! image.
 
+use std::marker::PhantomData;
+use std::sync::Arc;
+
 use super::camera::CameraRecord;
+use crate::error::Result;
+use crate::gpu::{Buffer, Device, Memory};
 pub use crate::interface::records::block::{BlockParams, TILE};
 use crate::sampling::morton::morton_pixel;
 
@@ -10,22 +15,59 @@ const MAX_PIXELS: u64 = 1 << 21;
 /// Number of pixels of a tile.
 pub const TILE_PIXELS: u32 = TILE * TILE;
 
-impl BlockParams {
-    /// A copy of these parameters with the camera, seed and geometry of a block.
-    pub fn at(&self, block: &Block, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> Self {
-        Self {
-            camera_to_world: camera.camera_to_world,
-            view: camera.view,
-            orthographic: camera.orthographic as u32,
-            clip_near: camera.clip[0],
-            clip_far: if camera.clip[1].is_finite() { camera.clip[1] } else { 0.0 },
-            seed,
-            image_size,
-            block_origin: block.origin,
-            block_size: block.size,
-            tiles_x: block.tiles_x(),
-            ..*self
-        }
+/// Parameters of a pass over a block in device memory: those of the block, and behind them the
+/// pass's own, as shaders expect them (`behind_block` in shaders/common/camera.glsl).
+pub struct PassParams<T> {
+    buffer: Buffer,
+    own: PhantomData<T>,
+}
+
+impl<T: bytemuck::NoUninit> PassParams<T> {
+    /// Where the pass's own parameters begin, bytes.
+    const OWN: u64 = size_of::<BlockParams>() as u64;
+
+    /// Allocates them; both parts are yet to be written.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
+        let buffer = Buffer::new(device, name, Self::OWN + size_of::<T>() as u64, Memory::Upload)?;
+        Ok(Self { buffer, own: PhantomData })
+    }
+
+    /// Device address of the parameters, for [`Push::pass`](crate::tracer::Push).
+    pub fn address(&self) -> u64 {
+        self.buffer.address()
+    }
+
+    /// Device address of the pass's own parameters.
+    pub fn own_address(&self) -> u64 {
+        self.buffer.address() + Self::OWN
+    }
+
+    /// Writes the parameters of the block.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn write_block(&mut self, block: &BlockParams) -> Result<()> {
+        self.buffer.write(0, bytemuck::bytes_of(block))
+    }
+
+    /// Writes the pass's own parameters.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn write_own(&mut self, own: &T) -> Result<()> {
+        self.buffer.write(Self::OWN, bytemuck::bytes_of(own))
+    }
+
+    /// Writes both.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn write(&mut self, block: &BlockParams, own: &T) -> Result<()> {
+        self.write_block(block)?;
+        self.write_own(own)
     }
 }
 
@@ -89,9 +131,21 @@ impl Block {
             .then(|| (self.origin[1] + y) as usize * image_width as usize + (self.origin[0] + x) as usize)
     }
 
-    /// Parameters of the block's passes; buffer addresses are not yet set.
+    /// Parameters of the block's passes: for all of its tiles, and rays through pixels' centres.
     pub fn params(&self, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> BlockParams {
-        BlockParams::default().at(self, image_size, camera, seed)
+        BlockParams {
+            camera_to_world: camera.camera_to_world,
+            view: camera.view,
+            orthographic: camera.orthographic as u32,
+            clip_near: camera.clip[0],
+            clip_far: if camera.clip[1].is_finite() { camera.clip[1] } else { 0.0 },
+            seed,
+            image_size,
+            block_origin: self.origin,
+            block_size: self.size,
+            tiles_x: self.tiles_x(),
+            ..Default::default()
+        }
     }
 }
 

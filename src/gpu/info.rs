@@ -267,18 +267,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let max_allocation = if vulkan13 { max_allocation(raw, physical) } else { 0 };
     let device_memory = device_memory(raw, physical);
     let limits = Limits { max_allocation, device_memory, ..limits(&properties, &v11, &f13, &structure, &pipeline) };
-    let api = properties.api_version;
     Ok(DeviceInfo {
         physical,
         index,
         name: text(&properties.device_name),
         kind,
-        api_version: format!(
-            "{}.{}.{}",
-            vk::api_version_major(api),
-            vk::api_version_minor(api),
-            vk::api_version_patch(api)
-        ),
+        api_version: version_text(properties.api_version),
         driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)),
         vendor_id: properties.vendor_id,
         device_id: properties.device_id,
@@ -293,6 +287,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         limits,
         queue_family,
     })
+}
+
+/// A Vulkan version, as people write it.
+fn version_text(version: u32) -> String {
+    let [major, minor] = [vk::api_version_major(version), vk::api_version_minor(version)];
+    format!("{major}.{minor}.{}", vk::api_version_patch(version))
 }
 
 /// Names of the features that the device lacks and skylit cannot do without.

@@ -6,11 +6,11 @@ use glam::DVec3;
 
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::block::{Block, BlockParams};
+use crate::film::block::{Block, PassParams};
 use crate::film::camera::CameraRecord;
 use crate::film::pace::{MAX_RAYS, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
-pub use crate::interface::records::aov::AovPixel;
+pub use crate::interface::records::aov::{AovParams, AovPixel};
 use crate::output::{Channel, Samples};
 use crate::raster::{CameraRays, Primary, View};
 use crate::settings::choices;
@@ -87,15 +87,13 @@ pub fn visit(
     let record = size_of::<AovPixel>() as u64;
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MAX_RAYS);
     let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Device)?;
-    let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
+    let mut params = PassParams::new(device, "parameters of auxiliary outputs")?;
+    params.write_own(&AovParams { pixels: target.address() })?;
 
     let mut pace = Pace::default();
     for block in &blocks {
         // Rasterize the block, if primary visibility is.
-        let params = BlockParams { aov: target.address(), ..block.params(size, camera, 0) };
-        if let Some(bytes) = params_buffer.bytes_mut() {
-            bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
-        }
+        params.write_block(&block.params(size, camera, 0))?;
         if rays.is_rasterized() {
             let view = View { camera: *camera, image_size: size, block: *block, at: [0.5; 2] };
             let mut drawn = Ok(());
@@ -104,7 +102,7 @@ pub fn visit(
         }
 
         // Launch after launch, whose pixels are read back.
-        let (scene, pass) = (tracer.scene_address(), params_buffer.address());
+        let (scene, pass) = (tracer.scene_address(), params.address());
         pace.run_launches(block.rays(), control, |first, count| {
             let push = Push { scene, pass, first, count, ..Default::default() };
             let timings = commands.run(|r| rays.record(r, &push))?;

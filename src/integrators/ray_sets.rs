@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::ao::{self, AoOptions};
+use super::ao::{self, AoOptions, Occlusion};
 use super::rays::{Mode, PreparedRays};
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
@@ -72,7 +72,7 @@ impl RaySets {
         let origin = scene.origin();
         let camera = CameraRecord::new(camera, origin, aspect);
         let samples = SampleSettings { keep_rays: true, ..SampleSettings::new(size, 1, SEED) };
-        let options = AoOptions { samples, radius: ao_radius, ..AoOptions::default() };
+        let options = AoOptions { samples, occlusion: Occlusion::new(ao_radius, 1.0), ..AoOptions::default() };
         let made = ao::render(tracer, &camera, &options, control)?;
         let (primary, occlusion) = (made.kept_primary, made.kept_occlusion);
         let mut prepared = PreparedRays::new(tracer, &primary, Mode::Closest)?;

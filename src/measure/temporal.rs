@@ -148,6 +148,25 @@ impl Ghosting {
         found
     }
 
+    /// Adds the share of `wrong`, what was right before a change, in an image. `settled` is its
+    /// final state, whose errors are no ghosts. `mask`: a value per pixel, above 0 where pixels take
+    /// part, for all of their channels. `None` where nothing differs.
+    pub fn add_beside(
+        &mut self,
+        (image, settled): (&[f32], &[f32]),
+        (truth, wrong): (&[f32], &[f32]),
+        mask: Option<&[f32]>,
+    ) -> Option<Residual> {
+        // as if it settled at the truth
+        let shifted: Vec<f32> = image.iter().zip(settled).zip(truth).map(|((v, s), t)| v - s + t).collect();
+        // a value a channel
+        let mask: Option<Vec<f32>> = mask.map(|mask| {
+            let channels = image.len() / mask.len().max(1);
+            mask.iter().flat_map(|&m| std::iter::repeat_n(m, channels)).collect()
+        });
+        self.add(&shifted, truth, wrong, mask.as_deref())
+    }
+
     /// Mean so far; NaN for no pixels.
     pub fn energy(&self) -> f64 {
         self.sum / self.pixels as f64

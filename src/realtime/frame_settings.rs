@@ -197,9 +197,7 @@ impl FrameSettings {
         s.filter.radius = self.filter_radius.unwrap_or(s.filter.radius);
         s.antialias = self.antialias.map_or(s.antialias, |a| a == Antialias::On);
         s.converge = self.at_rest.map_or(s.converge, |r| r == AtRest::Converge);
-        s.radius = ao.radius();
-        s.falloff = ao.ao_falloff.unwrap_or(s.falloff);
-        s.hemisphere = ao.hemisphere();
+        s.occlusion = ao.occlusion_with(s.occlusion.falloff);
         s.seed = seed;
         Ok(s)
     }

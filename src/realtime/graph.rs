@@ -43,6 +43,14 @@ pub struct Frame<'a> {
     pub display: Option<Display>,
 }
 
+impl Frame<'_> {
+    /// Push constants of a range: scene, address of the pass's parameters, and range.
+    pub fn push(&self, pass: u64, range: Range) -> Push {
+        let Range { first, count } = range;
+        Push { scene: self.tracer.scene_address(), pass, first, count, ..Default::default() }
+    }
+}
+
 /// A range of invocations or rays of a pass: `first .. first + count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Range {
@@ -444,8 +452,7 @@ impl<T: bytemuck::NoUninit> Params<T> {
 
     /// Push constants of a range: scene, parameters and range.
     pub fn push(&self, frame: &Frame, range: Range) -> Push {
-        let Range { first, count } = range;
-        Push { scene: frame.tracer.scene_address(), pass: self.address(), first, count, ..Default::default() }
+        frame.push(self.address(), range)
     }
 
     /// Records a compute pipeline with one invocation per element of `range`.

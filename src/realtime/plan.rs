@@ -122,7 +122,7 @@ pub trait Signal: Sync {
 
     /// Returns true if the previous image, by another camera, may have shown little of this one.
     fn may_be_cut(&self, before: &CameraRecord, now: &CameraRecord, settings: &Settings) -> bool {
-        is_jump(before, now, settings.attenuation().reach())
+        is_jump(before, now, settings.occlusion.reach())
     }
 
     /// Returns true if the mean of the samples at rest is denoised by itself.
@@ -325,6 +325,7 @@ fn sample_offset(frame: u32) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrators::ao::Occlusion;
     use crate::realtime::settings::{Preset, Resolution};
     use crate::realtime::signals::larsen::Larsen;
     use crate::realtime::signals::radiance::Radiance;
@@ -389,7 +390,7 @@ mod tests {
     }
 
     fn converging() -> Settings {
-        Settings { antialias: true, converge: true, radius: 2.0, ..Preset::Balanced.settings() }
+        Settings { antialias: true, converge: true, occlusion: Occlusion::new(2.0, 1.0), ..Preset::Balanced.settings() }
     }
 
     fn visibility() -> Frames {

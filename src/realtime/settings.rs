@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Specialization};
-use crate::integrators::ao::{Attenuation, Hemisphere};
+use crate::integrators::ao::Occlusion;
 use crate::integrators::path::PathOptions;
 pub use crate::interface::Resolution;
 use crate::interface::constants;
@@ -141,13 +141,9 @@ pub struct Settings {
     pub sequence: Sequence,
     /// Seed of the sampler.
     pub seed: u32,
-    /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
-    pub radius: f64,
-    /// AO falloff, at least 1: a hit at distance d occludes by `falloff^-d`; 1 is binary.
-    pub falloff: f64,
-    /// Axis of the hemisphere.
-    #[serde(skip)]
-    pub hemisphere: Hemisphere,
+    /// Which hits occlude.
+    #[serde(flatten)]
+    pub occlusion: Occlusion,
     /// Maximum history length, in frames; 1 disables temporal accumulation.
     pub history: u32,
     /// Stop tracing rays for pixels whose history is full while nothing moves.
@@ -216,11 +212,6 @@ impl Settings {
         }
     }
 
-    /// Attenuation of occlusion with distance.
-    pub fn attenuation(&self) -> Attenuation {
-        Attenuation { radius: self.radius, falloff: self.falloff }
-    }
-
     /// Maximum history length, in samples.
     pub fn most_samples(&self) -> u32 {
         (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
@@ -238,7 +229,8 @@ impl Settings {
         if self.history == 0 {
             return wrong("the history must be at least 1 frame (1 = no temporal accumulation)");
         }
-        let good = self.radius > 0.0 && self.falloff >= 1.0 && self.falloff.is_finite();
+        let Occlusion { radius, falloff, .. } = self.occlusion;
+        let good = radius > 0.0 && falloff >= 1.0 && falloff.is_finite();
         if !good {
             return wrong("the radius must be above 0, and the falloff at least 1 (1 = binary) and finite");
         }
@@ -323,9 +315,7 @@ impl Preset {
             resolution: Resolution::Full,
             sequence: Sequence::Sobol,
             seed: 0,
-            radius: f64::INFINITY,
-            falloff: 1.0,
-            hemisphere: Hemisphere::Geometric,
+            occlusion: Occlusion::default(),
             history: 32,
             rest: true,
             clamp: 2.0,
@@ -348,7 +338,7 @@ impl Preset {
                 technique: Technique::Larsen,
                 rays_per_pixel: 64,
                 resolution: Resolution::Half,
-                falloff: 8.0,
+                occlusion: Occlusion::new(f64::INFINITY, 8.0),
                 ..common
             },
             Preset::LarsenFixed => Settings {
@@ -375,31 +365,5 @@ impl Preset {
                 ..common
             },
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn steps_reach_to_the_radius() {
-        for kind in FilterKind::ALL {
-            for radius in [0, 1, 3, 7, 15] {
-                let steps = Filter { kind, radius, samples: 64.0 }.steps();
-                let reach: u32 = steps.iter().map(|s| s.radius * s.stride).sum();
-                let wanted = if kind == FilterKind::None { 0 } else { radius };
-                assert_eq!(reach, wanted, "{kind:?} {radius}");
-            }
-        }
-    }
-
-    #[test]
-    fn presets_are_sound() {
-        for preset in Preset::ALL {
-            preset.settings().check().unwrap();
-        }
-        let wrong = Settings { rays_per_pixel: 0, ..Settings::default() };
-        assert_eq!(wrong.check().unwrap_err().exit_code(), 64);
     }
 }

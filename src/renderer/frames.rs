@@ -15,14 +15,13 @@ use crate::files;
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, covered_mean};
 use crate::gpu::{Buffer, Device};
-use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::{PathOptions, PixelFilter};
 use crate::integrators::{IntegratorName, PictureOptions};
 use crate::output::png::Colour;
 use crate::output::{Channel, Image};
 use crate::realtime::display::{Display, DisplayMode};
-use crate::realtime::frame_settings::FrameRange;
+use crate::realtime::frame_settings::{FrameRange, FrameSettings};
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::camera_path::CameraPath;
@@ -103,11 +102,7 @@ impl Renderer {
         // The motion of camera and scene.
         let size = settings.size(scene);
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
-        let motion = camera_motion(scene, path, timeline.orbit)?;
-        let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
-        let file_camera = scene.cameras.iter().position(|c| *c == camera);
-        let sequence =
-            FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
+        let sequence = frame_sequence(scene, timeline, path, &camera, fps)?;
 
         // The tracer. A single frame is one whose histories are full, not what it converges to.
         let integrator = settings.integrator();
@@ -123,14 +118,13 @@ impl Renderer {
         let lead_in = timeline.lead_in.unwrap_or(0).min(if plays { range.first } else { u32::MAX });
         let warm_up =
             timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 || lead_in > 0 { 0 } else { settling() });
-        let frames = u64::from(range.end - range.first) + u64::from(warm_up) + u64::from(lead_in);
+        let samples = (u64::from(range.end - range.first) + u64::from(warm_up) + u64::from(lead_in))
+            .saturating_mul(u64::from(size[0]) * u64::from(size[1]));
+        let rays_per_sample = if is_radiance { integrator.get().rays_per_sample() } else { 1 };
         let request = TracerRequest {
             needs: frame_needs(&settings, &realtime_settings),
             streams: frame_streams(&settings, &realtime_settings),
-            rays: frames.saturating_mul(u64::from(size[0]) * u64::from(size[1])).saturating_mul(
-                1 + u64::from(realtime_settings.rays_per_pixel)
-                    * if is_radiance { integrator.get().rays_per_sample() } else { 1 },
-            ),
+            rays: samples.saturating_mul(1 + u64::from(realtime_settings.rays_per_pixel) * rays_per_sample),
             control: &mut *control,
             warnings: &mut warnings,
         };
@@ -145,54 +139,23 @@ impl Renderer {
             realtime.display(&tracer, Some(frame_display(&settings, scene)))?;
         }
 
-        // Metadata of images, and the report.
-        let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), &settings.scene, warnings);
-        let primary = realtime.settings().primary.unwrap_or_default();
-        let preset = timeline.preset.unwrap_or_default();
-        let mut metadata = match &options {
-            Some(options) => {
-                let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
-                // samples lie where the frames have them
-                options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
-            }
-            None => vec![
-                ("ao.falloff", realtime_settings.falloff.to_string()),
-                ("ao.radius", realtime_settings.radius.to_string()),
-                ("ao.normal", realtime_settings.hemisphere.to_string()),
-                ("sequence", realtime_settings.sequence.to_string()),
-                ("technique", realtime_settings.technique.to_string()),
-            ],
-        };
-        let filter = if realtime_settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
-        metadata.extend([
-            ("device", format!("{} ({})", setup.device, setup.driver)),
-            ("history", realtime_settings.history.to_string()),
-            ("integrator", integrator.name().into()),
-            ("pixel_filter", filter.to_string()),
-            ("preset", preset.to_string()),
-            ("primary", primary.to_string()),
-            ("rays_per_pixel", realtime_settings.rays_per_pixel.to_string()),
-            ("resolution", realtime_settings.resolution.to_string()),
-            ("scene", files::portable_name(&setup.scene)),
-            ("seed", realtime_settings.seed.to_string()),
-            ("tracer", setup.tracer.to_string()),
-            ("version", env!("CARGO_PKG_VERSION").into()),
-        ]);
-        metadata.extend(chosen.map(|options| (CHOSEN, options)));
-        metadata.extend(setup.scene_options.clone().map(|options| (SCENE_OPTIONS, options)));
+        // The report, and metadata of images.
         let report = FramesReport {
             integrator,
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
-            setup,
-            preset,
+            setup: Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), &settings.scene, warnings),
+            preset: timeline.preset.unwrap_or_default(),
             settings: realtime_settings,
-            primary,
+            primary: realtime.settings().primary.unwrap_or_default(),
             primary_reason: realtime.primary_reason().to_owned(),
             frames: Vec::new(),
             mean: 0.0,
             brightness: None,
             seconds: Seconds::default(),
         };
+        let mut metadata = frame_metadata(&report, options.as_ref());
+        metadata.extend(chosen.map(|options| (CHOSEN, options)));
+        metadata.extend(report.setup.scene_options.clone().map(|options| (SCENE_OPTIONS, options)));
 
         // Keep the pipelines for later calls.
         self.pipelines = self.device.live_pipelines();
@@ -424,7 +387,7 @@ pub fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
 pub fn frame_needs(settings: &RenderSettings, realtime_settings: &Settings) -> Needs {
     let integrator = settings.integrator();
     let needs = if is_ambient_occlusion(integrator) {
-        Needs { normals: realtime_settings.hemisphere == Hemisphere::Shading, ..Default::default() }
+        Needs { normals: realtime_settings.occlusion.is_about_shading_normals(), ..Default::default() }
     } else {
         integrator.get().needs(&settings.integrators)
     };
@@ -439,6 +402,38 @@ pub fn frame_streams(settings: &RenderSettings, realtime_settings: &Settings) ->
     } else {
         integrator.get().streams(&settings.integrators)
     }
+}
+
+/// Metadata of the images of frames. `options`: those of frames of radiance.
+fn frame_metadata(report: &FramesReport, options: Option<&PathOptions>) -> Vec<(&'static str, String)> {
+    let FramesReport { setup, settings, .. } = report;
+    let mut metadata: Vec<_> = match options {
+        Some(options) => {
+            let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
+            // samples lie where the frames have them
+            options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
+        }
+        None => {
+            let others = [("sequence", settings.sequence.to_string()), ("technique", settings.technique.to_string())];
+            settings.occlusion.metadata().into_iter().chain(others).collect()
+        }
+    };
+    let filter = if settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
+    metadata.extend([
+        ("device", format!("{} ({})", setup.device, setup.driver)),
+        ("history", settings.history.to_string()),
+        ("integrator", report.integrator.name().into()),
+        ("pixel_filter", filter.to_string()),
+        ("preset", report.preset.to_string()),
+        ("primary", report.primary.to_string()),
+        ("rays_per_pixel", settings.rays_per_pixel.to_string()),
+        ("resolution", settings.resolution.to_string()),
+        ("scene", files::portable_name(&setup.scene)),
+        ("seed", settings.seed.to_string()),
+        ("tracer", setup.tracer.to_string()),
+        ("version", env!("CARGO_PKG_VERSION").into()),
+    ]);
+    metadata
 }
 
 /// Options of the paths of frames of radiance; `None` for ambient occlusion.
@@ -518,6 +513,21 @@ pub(super) fn camera_motion(
         (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
         (None, None) => CameraMotion::Still,
     })
+}
+
+/// Scene and camera over time, as settings of frames have them.
+fn frame_sequence<'a>(
+    scene: &'a Scene,
+    timeline: &FrameSettings,
+    path: Option<CameraPath>,
+    camera: &Camera,
+    fps: f64,
+) -> Result<FrameSequence<'a>> {
+    let motion = camera_motion(scene, path, timeline.orbit)?;
+    let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
+    let file_camera = scene.cameras.iter().position(|c| c == camera);
+    let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
+    Ok(sequence.held_at(timeline.time))
 }
 
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {

@@ -554,7 +554,7 @@ impl FramesReport {
         if self.is_radiance() {
             return lines;
         }
-        lines.push(match (s.attenuation().is_binary(), s.attenuation().visible_reach()) {
+        lines.push(match (s.occlusion.is_binary(), s.occlusion.visible_reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {} ends a ray", significant(r, 4)),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
             (false, r) => {
@@ -587,7 +587,7 @@ impl FramesReport {
         let [primary, occlusion, skipped] = self.rays();
         let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
         let mut settings = json!(self.settings);
-        settings["radius"] = finite(self.settings.radius);
+        settings["radius"] = finite(self.settings.occlusion.radius);
         let frame = |f: &FrameReport| {
             json!({
                 "frame": f.number,

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::film::SampleSettings;
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, Film};
-use crate::integrators::ao::{self, AoOptions, AoResult};
+use crate::integrators::ao::{self, AoOptions, AoResult, Occlusion};
 use crate::oracle::OracleRay;
 use crate::oracle::camera::camera_ray;
 use crate::scene::{Camera, Scene};
@@ -119,7 +119,11 @@ pub fn render(
 
 /// Options of a square image.
 pub fn options(size: u32, spp: u32, falloff: f64, radius: f64) -> AoOptions {
-    AoOptions { samples: SampleSettings::new([size, size], spp, 1), falloff, radius, ..Default::default() }
+    AoOptions {
+        samples: SampleSettings::new([size, size], spp, 1),
+        occlusion: Occlusion::new(radius, falloff),
+        ..Default::default()
+    }
 }
 
 /// Where a ray meets the plane through `point` with unit normal `normal`, seen from its front.

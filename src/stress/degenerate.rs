@@ -11,7 +11,7 @@ use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
-use crate::integrators::ao::{self, AoOptions};
+use crate::integrators::ao::{self, AoOptions, Occlusion};
 use crate::integrators::aov;
 use crate::integrators::rays::{Mode, trace};
 use crate::measure::parity::{ParityReport, judge_any, judge_closest};
@@ -283,7 +283,11 @@ pub fn unsound_values(tracer: &Tracer, scene: &Scene, control: &mut dyn Control)
     let camera = CameraRecord::new(&Camera::framing(lo, hi, 1.0), scene.origin(), 1.0);
     let mut bad = 0;
     for falloff in [1.0, 4.0] {
-        let options = AoOptions { samples: SampleSettings::new([16, 16], 2, 0), falloff, ..Default::default() };
+        let options = AoOptions {
+            samples: SampleSettings::new([16, 16], 2, 0),
+            occlusion: Occlusion::new(f64::INFINITY, falloff),
+            ..Default::default()
+        };
         let image = ao::render(tracer, &camera, &options, control)?;
         let all = image.image.film.mean.iter().chain(&image.image.film.variance);
         bad += all.filter(|x| !(0.0..=1.0).contains(*x)).count();

@@ -234,60 +234,12 @@ fn scene_of(setup: &Setup) -> Result<&Scene> {
 /// The expected effects of the scene's data, a check each.
 pub fn data(scene: &Scene) -> Vec<Check> {
     let (inventory, anatomy) = (Inventory::from_scene(scene), Anatomy::from_scene(scene));
-    let mut out = Vec::new();
-    let mut report = |name: &str, value: f64, unit: &'static str, sentence: String| {
-        out.push(Check::reported(name, value, unit).says(sentence));
-    };
-
-    // Positions have a limited number of bits.
-    let (step, at) = anatomy.step;
-    let bits = anatomy.spent_bits.floor();
-    report(
-        "precision of positions",
-        step,
-        "units",
-        match bits {
-            // scenes of which the origin is in a corner have as much
-            b if b < 4.0 => {
-                format!("steps at coordinates of {}; positions have {} of 24 bits for detail", number(at), DIGITS - b)
-            }
-            _ => format!(
-                "positions use {bits} of 24 bits at {} to say where the mesh is: expect steps of {}; put the distance into a node's translation",
-                number(at),
-                number(step)
-            ),
-        },
-    );
-    if let Some((lo, hi)) = scene.bounds() {
-        let (origin, size) = (scene.origin(), (hi - lo).max_element());
-        let before = step_at(lo.abs().max(hi.abs()).max_element());
-        let after = step_at((lo - origin).abs().max((hi - origin).abs()).max_element());
-        let sentence = if origin == DVec3::ZERO {
-            "the origin is left where it is".to_owned()
-        } else {
-            format!("the origin was moved to {origin}: a step was {}, and is {} now", number(before), number(after))
-        };
-        report("step of the scene for tracers", after, "units", sentence);
-        // what moving cannot mend: a scene that is large and detailed
-        let (distance, ratio) = ((lo + hi).length() * 0.5, anatomy.scale_ratio);
-        report("distance from the origin", distance, "units", format!("of a scene {} units large", number(size)));
-        let lost = if ratio > 1e7 { "; the shortest are below a rounding of the longest" } else { "" };
-        report(
-            "longest edge over shortest",
-            ratio,
-            "",
-            format!("edges differ by {:.0} decades{lost}", ratio.log10().max(0.0)),
-        );
-    }
+    let mut out = positions(scene, &anatomy);
 
     // Triangles may have hardly any area.
     let dropped = inventory.degenerate_triangles as f64;
-    report(
-        "degenerate triangles",
-        dropped,
-        "triangles",
-        if dropped > 0.0 { "dropped".into() } else { "none was dropped".into() },
-    );
+    let sentence = if dropped > 0.0 { "dropped" } else { "none was dropped" };
+    out.push(Check::reported("degenerate triangles", dropped, "triangles").says(sentence));
     out.push(
         Check::none_of("degenerate triangles that are left", anatomy.degenerate, "triangles", false)
             .says("they have no area in f64 and are never hit"),
@@ -338,6 +290,59 @@ pub fn data(scene: &Scene) -> Vec<Check> {
     );
     // decoders let no such texel in
     out.push(Check::at_most("texels that are NaN, infinite or negative", anatomy.bad_texels as f64, "texels", 0.0));
+    out
+}
+
+/// The expected effects of where a scene is and how large its parts are: positions have a limited
+/// number of bits.
+fn positions(scene: &Scene, anatomy: &Anatomy) -> Vec<Check> {
+    let mut out = Vec::new();
+    let mut report = |name: &str, value: f64, unit: &'static str, sentence: String| {
+        out.push(Check::reported(name, value, unit).says(sentence));
+    };
+
+    // Where meshes are takes bits from what they are.
+    let (step, at) = anatomy.step;
+    let bits = anatomy.spent_bits.floor();
+    report(
+        "precision of positions",
+        step,
+        "units",
+        match bits {
+            // scenes of which the origin is in a corner have as much
+            b if b < 4.0 => {
+                format!("steps at coordinates of {}; positions have {} of 24 bits for detail", number(at), DIGITS - b)
+            }
+            _ => format!(
+                "positions use {bits} of 24 bits at {} to say where the mesh is: expect steps of {}; put the distance into a node's translation",
+                number(at),
+                number(step)
+            ),
+        },
+    );
+
+    // The scene is moved to its origin, which mends its distance and not its size.
+    if let Some((lo, hi)) = scene.bounds() {
+        let (origin, size) = (scene.origin(), (hi - lo).max_element());
+        let before = step_at(lo.abs().max(hi.abs()).max_element());
+        let after = step_at((lo - origin).abs().max((hi - origin).abs()).max_element());
+        let sentence = if origin == DVec3::ZERO {
+            "the origin is left where it is".to_owned()
+        } else {
+            format!("the origin was moved to {origin}: a step was {}, and is {} now", number(before), number(after))
+        };
+        report("step of the scene for tracers", after, "units", sentence);
+        // what moving cannot mend: a scene that is large and detailed
+        let (distance, ratio) = ((lo + hi).length() * 0.5, anatomy.scale_ratio);
+        report("distance from the origin", distance, "units", format!("of a scene {} units large", number(size)));
+        let lost = if ratio > 1e7 { "; the shortest are below a rounding of the longest" } else { "" };
+        report(
+            "longest edge over shortest",
+            ratio,
+            "",
+            format!("edges differ by {:.0} decades{lost}", ratio.log10().max(0.0)),
+        );
+    }
     out
 }
 

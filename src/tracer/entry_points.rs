@@ -6,7 +6,7 @@
 use super::{Push, Stream, Tracer};
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
-use crate::interface::records::block::{BUNDLE_BITS, ENTRY_LIST_BYTES};
+use crate::interface::records::ao::{BUNDLE_BITS, ENTRY_LIST_BYTES};
 use crate::shaders::{self, PACKET_RAYS};
 
 /// The lists of a launch, and the pass that writes them.
@@ -41,7 +41,7 @@ impl EntryPoints {
         }))
     }
 
-    /// Device address of the lists, for `BlockParams`.
+    /// Device address of the lists, for `AoParams`.
     pub fn address(&self) -> u64 {
         self.lists.address()
     }

@@ -70,12 +70,6 @@ impl CameraControl {
         self.eye() + self.forward() * self.distance
     }
 
-    /// Sets the point that it orbits, which stays where it is in the image only if it is in the
-    /// view's centre.
-    pub fn set_pivot_distance(&mut self, distance: f64) {
-        self.distance = distance.max(1e-6 * self.scene_size);
-    }
-
     /// Points it in a direction, given as turns about the vertical and about its own horizontal
     /// axis; roll is kept out.
     fn turn(&mut self, yaw: f64, pitch: f64) {

@@ -323,56 +323,16 @@ impl Script {
         app: &App,
         requests: &mut HostRequests,
     ) -> Result<bool, String> {
-        let elapsed = current.start.elapsed();
-        let step = current.step;
+        let (elapsed, step) = (current.start.elapsed(), current.step);
         current.step += 1;
         match &current.command {
             Command::Wait(time) => Ok(elapsed >= *time),
-            Command::WaitFor(condition, most) => {
-                let holds = match condition {
-                    Condition::Picture => app.panes[0].progress.is_some(),
-                    Condition::Settled => app.is_settled(),
-                    Condition::Samples(count) => app.shown_samples() >= *count || app.is_settled(),
-                    Condition::Compared => app.comparison.is_some(),
-                    Condition::Text(text) => self.contains(text),
-                };
-                // a frame at least, so that what was done before is requested
-                if step > 1
-                    && let Some(why) = self.hopeless(condition, app)
-                {
-                    return Err(format!("{} will not come: {why}", condition.name()));
-                }
-                match (holds, elapsed > *most) {
-                    (false, true) => Err(format!("waited {most:?} for {}{}", condition.name(), self.shown_errors(app))),
-                    (holds, _) if holds && step > 1 => {
-                        self.acknowledge(condition, app);
-                        Ok(true)
-                    }
-                    _ => Ok(false),
-                }
-            }
+            Command::WaitFor(condition, most) => self.wait_for(condition, app, step, (elapsed, *most)),
 
             // keys and text
             Command::Key(modifiers, key, time) => {
-                let event = |pressed| Event::Key {
-                    key: *key,
-                    physical_key: None,
-                    pressed,
-                    repeat: false,
-                    modifiers: *modifiers,
-                };
-                input.modifiers = *modifiers;
-                if step == 0 {
-                    input.events.push(event(true));
-                    if modifiers.command && *key == Key::C {
-                        input.events.push(Event::Copy);
-                    }
-                    // a question mark is text on keyboards
-                }
                 let ends = step > 0 && elapsed >= *time;
-                if ends {
-                    input.events.push(event(false));
-                }
+                press_key(input, *modifiers, *key, step == 0, ends);
                 Ok(ends)
             }
             Command::Type(text) => {
@@ -381,32 +341,22 @@ impl Script {
             }
 
             // controls by their labels
-            Command::Click(label) => match self.bring_into_view(label, current.seen, input) {
-                Ok(seen) if seen.elapsed() < SCROLLING => {
-                    current.seen = Some(seen);
-                    self.move_to(input, self.pointer);
-                    Ok(false)
-                }
-                Ok(_) => {
-                    let place = self.place_of(label)?;
+            Command::Click(label) => {
+                if let Some(place) = self.place_in_view(label, &mut current.seen, input, elapsed)? {
                     (current.command, current.step) = (Command::Press(place, PointerButton::Primary, 1), 0);
-                    Ok(false)
                 }
-                // a menu or a list opens with the next frame
+                Ok(false)
+            }
+            Command::Set(label, value) => match self.find(label, true) {
+                Ok((target, _)) => {
+                    let data = Some(accesskit::ActionData::NumericValue(*value));
+                    let request = accesskit::ActionRequest { action: accesskit::Action::SetValue, target, data };
+                    input.events.push(Event::AccessKitActionRequest(request));
+                    Ok(true)
+                }
                 Err(_) if elapsed < OPENING => Ok(false),
                 Err(e) => Err(e),
             },
-            Command::Set(label, value) => {
-                let id = match self.find(label, true) {
-                    Ok((id, _)) => id,
-                    Err(_) if elapsed < OPENING => return Ok(false),
-                    Err(e) => return Err(e),
-                };
-                let data = Some(accesskit::ActionData::NumericValue(*value));
-                let request = accesskit::ActionRequest { action: accesskit::Action::SetValue, target: id, data };
-                input.events.push(Event::AccessKitActionRequest(request));
-                Ok(true)
-            }
 
             // the pointer
             Command::Press(at, button, times) => Ok(self.click(input, *at, *button, step, *times)),
@@ -414,28 +364,16 @@ impl Script {
                 Ok(self.drag(input, [*from, *to], *time, *button, *modifiers, step, elapsed))
             }
             Command::DragControl(label, by, time) => {
-                let from = match self.bring_into_view(label, current.seen, input) {
-                    Ok(seen) if seen.elapsed() < SCROLLING => {
-                        current.seen = Some(seen);
-                        // a frame shows it where it is now
-                        self.move_to(input, self.pointer);
-                        return Ok(false);
-                    }
-                    Ok(_) => self.place_of(label)?,
-                    Err(_) if elapsed < OPENING => return Ok(false),
-                    Err(e) => return Err(e),
-                };
-                let drag = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
-                (current.command, current.step, current.start) = (drag, 0, Instant::now());
+                if let Some(from) = self.place_in_view(label, &mut current.seen, input, elapsed)? {
+                    let drag = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
+                    (current.command, current.step, current.start) = (drag, 0, Instant::now());
+                }
                 Ok(false)
             }
             Command::Wheel(at, lines) => {
                 self.move_to(input, *at);
-                input.events.push(Event::MouseWheel {
-                    unit: MouseWheelUnit::Line,
-                    delta: Vec2::new(0.0, *lines),
-                    modifiers: Modifiers::NONE,
-                });
+                let (unit, delta) = (MouseWheelUnit::Line, Vec2::new(0.0, *lines));
+                input.events.push(Event::MouseWheel { unit, delta, modifiers: Modifiers::NONE });
                 Ok(true)
             }
 
@@ -476,6 +414,59 @@ impl Script {
                 None => Ok(true),
                 Some(error) => Err(format!("an error was shown: {error}")),
             },
+        }
+    }
+
+    /// Waits for a condition, for `most` of time; returns true once it holds.
+    fn wait_for(
+        &mut self,
+        condition: &Condition,
+        app: &App,
+        step: u32,
+        (elapsed, most): (Duration, Duration),
+    ) -> Result<bool, String> {
+        let holds = match condition {
+            Condition::Picture => app.panes[0].progress.is_some(),
+            Condition::Settled => app.is_settled(),
+            Condition::Samples(count) => app.shown_samples() >= *count || app.is_settled(),
+            Condition::Compared => app.comparison.is_some(),
+            Condition::Text(text) => self.contains(text),
+        };
+        // a frame at least, so that what was done before is requested
+        if step > 1
+            && let Some(why) = self.hopeless(condition, app)
+        {
+            return Err(format!("{} will not come: {why}", condition.name()));
+        }
+        if !holds && elapsed > most {
+            return Err(format!("waited {most:?} for {}{}", condition.name(), self.shown_errors(app)));
+        }
+        let ends = holds && step > 1;
+        if ends {
+            self.acknowledge(condition, app);
+        }
+        Ok(ends)
+    }
+
+    /// The place of a control that has been scrolled into view; `None` while it scrolls or opens.
+    fn place_in_view(
+        &mut self,
+        label: &str,
+        since: &mut Option<Instant>,
+        input: &mut RawInput,
+        elapsed: Duration,
+    ) -> Result<Option<Pos2>, String> {
+        match self.bring_into_view(label, *since, input) {
+            Ok(seen) if seen.elapsed() < SCROLLING => {
+                *since = Some(seen);
+                // a frame shows it where it is now
+                self.move_to(input, self.pointer);
+                Ok(None)
+            }
+            Ok(_) => self.place_of(label).map(Some),
+            // a menu or a list opens with the next frame
+            Err(_) if elapsed < OPENING => Ok(None),
+            Err(e) => Err(e),
         }
     }
 
@@ -597,6 +588,22 @@ impl Script {
 
     fn contains(&self, text: &str) -> bool {
         self.tree.iter().any(|(_, n)| self.name_of(n).contains(text) || n.value().is_some_and(|v| v.contains(text)))
+    }
+}
+
+/// Presses a key where it `begins`, and releases it where it `ends`.
+fn press_key(input: &mut RawInput, modifiers: Modifiers, key: Key, begins: bool, ends: bool) {
+    let event = |pressed| Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
+    input.modifiers = modifiers;
+    if begins {
+        input.events.push(event(true));
+        if modifiers.command && key == Key::C {
+            input.events.push(Event::Copy);
+        }
+        // a question mark is text on keyboards
+    }
+    if ends {
+        input.events.push(event(false));
     }
 }
 

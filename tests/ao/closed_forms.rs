@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use skylit::film::NoControl;
 use skylit::gpu::Device;
-use skylit::integrators::ao::AoOptions;
+use skylit::integrators::ao::{AoOptions, Occlusion};
 use skylit::oracle::Oracle;
 use skylit::oracle::closed_form as exact;
 use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
@@ -51,9 +51,9 @@ fn check(device: &Arc<Device>, case: &Case) {
     }
 }
 
-/// Hits beyond [`Attenuation::reach`](skylit::integrators::ao::Attenuation::reach) change no sample, so closed forms may have it as their radius.
+/// Hits beyond [`Occlusion::reach`] change no sample, so closed forms may have it as their radius.
 fn reach(falloff: f64) -> f64 {
-    AoOptions { falloff, ..Default::default() }.attenuation().reach()
+    Occlusion::new(f64::INFINITY, falloff).reach()
 }
 
 #[test]
@@ -512,7 +512,10 @@ fn gpu_ao_about_shading_normals() {
                 what: &format!("top of a box, {hemisphere:?} normal"),
                 scene: &scene,
                 camera: camera.clone(),
-                options: AoOptions { hemisphere, ..options(32, 512, 1.0, f64::INFINITY) },
+                options: AoOptions {
+                    occlusion: Occlusion { hemisphere, ..Default::default() },
+                    ..options(32, 512, 1.0, f64::INFINITY)
+                },
                 surface: &|ray| on_plane(ray, DVec3::Y, DVec3::Y).filter(|p| p.x.abs().max(p.z.abs()) < 0.999),
                 expected: &|_| want,
             },

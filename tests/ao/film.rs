@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::SampleSettings;
 use skylit::film::tile_mask::TileMask;
+use skylit::integrators::ao::Occlusion;
 use skylit::oracle::Oracle;
 use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
@@ -23,7 +24,11 @@ fn gpu_film_sums_are_compensated() {
     // a small floor: rays start above it by a few ulp of its size, and that much less is met
     let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default());
     let camera = Camera::look_at(DVec3::new(1.0, 0.2, 0.0), DVec3::ZERO, DVec3::Y, 0.02);
-    let options = AoOptions { samples: SampleSettings::new([3, 2], 20_000, 0), falloff: 1.7, ..Default::default() };
+    let options = AoOptions {
+        samples: SampleSettings::new([3, 2], 20_000, 0),
+        occlusion: Occlusion::new(f64::INFINITY, 1.7),
+        ..Default::default()
+    };
     let oracle = Oracle::new(&scene, scene.origin());
     let want = oracle_image(&oracle, &camera, &options);
     for kind in picked(&device) {
@@ -90,7 +95,11 @@ fn gpu_film_does_not_depend_on_batches() {
     let device = device();
     let scene = scene("leaf-cards");
     let camera = &scene.cameras[0];
-    let options = AoOptions { samples: SampleSettings::new([70, 45], 23, 0), falloff: 3.0, ..Default::default() };
+    let options = AoOptions {
+        samples: SampleSettings::new([70, 45], 23, 0),
+        occlusion: Occlusion::new(f64::INFINITY, 3.0),
+        ..Default::default()
+    };
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &scene);
         // 16 + 4 + 2 + 1 samples

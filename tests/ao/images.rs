@@ -8,6 +8,7 @@ use skylit::accel::flatten::FlatScene;
 use skylit::film::SampleSettings;
 use skylit::film::block::Block;
 use skylit::gpu::Device;
+use skylit::integrators::ao::Occlusion;
 use skylit::interface::PixelFilter;
 use skylit::oracle::Oracle;
 use skylit::oracle::ao as oracle_ao;
@@ -69,7 +70,11 @@ fn gpu_images_equal_the_oracles() {
     for (name, falloff, radius) in [("stairs", 8.0, f64::INFINITY), ("leaf-cards", 2.0, 0.6), ("spheres:300", 1.0, 0.5)]
     {
         let scene = scene(name);
-        let options = AoOptions { samples: SampleSettings::new([96, 72], 8, 4), falloff, radius, ..Default::default() };
+        let options = AoOptions {
+            samples: SampleSettings::new([96, 72], 8, 4),
+            occlusion: Occlusion::new(radius, falloff),
+            ..Default::default()
+        };
         let what = format!("{name}, falloff {falloff}, radius {radius}");
         compare_with_oracle(&device, &what, &scene, &scene.cameras[0], &options);
     }
@@ -99,7 +104,7 @@ fn gpu_shared_camera_rays() {
         let scene = scene(name);
         let camera = &scene.cameras[0];
         let samples = SampleSettings::new([96, 72], spp, 3);
-        let options = AoOptions { samples, falloff, rays, ..Default::default() };
+        let options = AoOptions { samples, occlusion: Occlusion::new(f64::INFINITY, falloff), rays };
         compare_with_oracle(&device, &format!("{name}, {rays} rays"), &scene, camera, &options);
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &scene);

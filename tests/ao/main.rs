@@ -25,7 +25,7 @@ fn render(tracer: &Tracer, scene: &Scene, camera: &Camera, options: &AoOptions) 
 
 fn settings(options: &AoOptions) -> AoSettings {
     // what is beyond the reach is not traced for
-    AoSettings { radius: options.attenuation().reach(), falloff: options.falloff, rays: options.rays }
+    AoSettings { radius: options.occlusion.reach(), falloff: options.occlusion.falloff, rays: options.rays }
 }
 
 /// Pixels that differ by more than `threshold`, greatest difference, and difference of the means.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use skylit::film::SampleSettings;
 use skylit::film::block::Block;
+use skylit::integrators::ao::Occlusion;
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, warp};
@@ -19,7 +20,7 @@ fn gpu_kept_rays_are_the_images() {
     let oracle = Oracle::new(&scene, scene.origin());
     let options = AoOptions {
         samples: SampleSettings { keep_rays: true, ..SampleSettings::new([75, 50], 2, 5) },
-        radius: 1.25,
+        occlusion: Occlusion::new(1.25, 1.0),
         ..Default::default()
     };
     let sampler = Sampler { seed: options.samples.seed };

@@ -16,19 +16,24 @@ mod bench_report;
 mod chosen;
 mod compare;
 mod compare_ao;
+mod compare_renders;
+mod compare_text;
 mod config;
 #[cfg(unix)]
 mod confine;
 mod convert;
+mod image_sets;
 mod info;
 #[cfg(unix)]
 mod limits;
 mod manners;
 mod measured;
 mod outputs;
+mod parse;
 mod program;
 mod quality;
 #[cfg(unix)]
 mod replaced;
+mod report_table;
 mod sequences;
 mod stress;

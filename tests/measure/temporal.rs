@@ -188,3 +188,23 @@ fn drift_under_noise() {
     println!("level: {passed} of noise, {passed_smooth} of smooth noise; drift found in {found}");
     assert!(passed >= 97 && passed_smooth >= 96 && found >= 97, "{passed} {passed_smooth} {found}");
 }
+
+#[test]
+fn a_lasting_error_is_no_ghost() {
+    let (old, new) = ([0.0, 1.0], [1.0, 0.0]);
+    // it ends a tenth too bright, and a quarter of the old is left
+    let settled = [1.1, 0.1];
+    let image = [0.85, 0.35];
+    let mut ghosting = Ghosting::default();
+    let left = ghosting.add_beside((&image, &settled), (&new, &old), None).unwrap();
+    assert!((left.share - 0.25).abs() < 1e-6 && (ghosting.energy() - 0.0625).abs() < 1e-6);
+}
+
+/// Two pixels of three channels, of which the second counts.
+#[test]
+fn a_pixel_counts_with_all_channels() {
+    let (old, new) = ([0.0; 6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let image = [9.0, 9.0, 9.0, 0.5, 0.5, 0.5];
+    let left = Ghosting::default().add_beside((&image, &new), (&new, &old), Some(&[0.0, 1.0])).unwrap();
+    assert!(left.pixels == 3 && (left.share - 0.5).abs() < 1e-6, "{left:?}");
+}

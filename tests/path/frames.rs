@@ -4,7 +4,7 @@ use super::*;
 use glam::DQuat;
 use skylit::accel::features::Blend;
 use skylit::colour::srgb_byte;
-use skylit::integrators::ao::{Attenuation, Hemisphere};
+use skylit::integrators::ao::Occlusion;
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
 use skylit::integrators::path::{PathIntegrator, PixelFilter};
 use skylit::output::tone_map::ToneMap;
@@ -60,8 +60,7 @@ fn gpu_frames_the_parts_of_radiance_add_up() {
     let device = device();
     let lit = Ambient {
         color: Vec3::new(1.0, 0.5, 0.25),
-        attenuation: Attenuation { radius: 1.0, falloff: 1.0 },
-        hemisphere: Hemisphere::Geometric,
+        occlusion: Occlusion::new(1.0, 1.0),
         occluded: OccludedLight::Ambient,
     };
     let variants = [

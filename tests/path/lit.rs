@@ -1,7 +1,7 @@
 //! The integrator `lit`: direct light plus ambient light times ambient occlusion and albedo.
 
 use super::*;
-use skylit::integrators::ao::{self, AoOptions, Attenuation, Hemisphere};
+use skylit::integrators::ao::{self, AoOptions, Occlusion};
 use skylit::integrators::path::ambient::{self, Ambient, AmbientSample, OccludedLight};
 use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
 use skylit::scene::material::Transmission;
@@ -9,12 +9,7 @@ use skylit::scene::material::Transmission;
 const SIZE: [u32; 2] = [32, 24];
 
 fn ambient(color: Vec3, radius: f64, falloff: f64) -> Ambient {
-    Ambient {
-        color,
-        attenuation: Attenuation { radius, falloff },
-        hemisphere: Hemisphere::Geometric,
-        occluded: OccludedLight::Ambient,
-    }
+    Ambient { color, occlusion: Occlusion::new(radius, falloff), occluded: OccludedLight::Ambient }
 }
 
 /// What the integrator makes of these settings.
@@ -83,7 +78,7 @@ fn gpu_lit_occlusion_can_darken_all_light() {
         let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
         let ao = AoOptions {
             samples: SampleSettings { pixel_filter: path::PixelFilter::Centre, ..SampleSettings::new(SIZE, 1024, 6) },
-            radius: 0.3,
+            occlusion: Occlusion::new(0.3, 1.0),
             ..Default::default()
         };
         let visible = ao::render(tracer, &record, &ao, &mut NoControl).unwrap().image.film.mean;
@@ -112,8 +107,11 @@ fn gpu_lit_without_lights_is_ao_times_albedo_times_ambient() {
         let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
         for (radius, falloff) in [(f64::INFINITY, 1.0), (1.5, 1.0), (f64::INFINITY, 2.0), (2.0, 1.5)] {
             let spp = if falloff > 1.0 { 64 } else { 8 };
-            let options =
-                AoOptions { samples: SampleSettings::new(SIZE, spp, 5), radius, falloff, ..Default::default() };
+            let options = AoOptions {
+                samples: SampleSettings::new(SIZE, spp, 5),
+                occlusion: Occlusion::new(radius, falloff),
+                ..Default::default()
+            };
             let visibility = ao::render(tracer, &record, &options, &mut NoControl).unwrap().image.film;
             let result = render(tracer, flat, &lit(spp, ambient(colour, radius, falloff)));
             let film = result.image.film;

@@ -5,7 +5,7 @@ use super::*;
 use crate::common::new_device;
 use glam::{Affine2, Vec2, Vec4};
 use skylit::accel::features::SceneFeatures;
-use skylit::integrators::ao::{Attenuation, Hemisphere};
+use skylit::integrators::ao::{Hemisphere, Occlusion};
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
 use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
 use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
@@ -138,8 +138,7 @@ fn gpu_kernels_of_all_features_are_valid() {
         texture_filter: TextureFilter::RayCone,
         ambient: Some(Ambient {
             color: Vec3::ONE,
-            attenuation: Attenuation { radius: 1.0, falloff: 2.0 },
-            hemisphere: Hemisphere::Shading,
+            occlusion: Occlusion { radius: 1.0, falloff: 2.0, hemisphere: Hemisphere::Shading },
             occluded: OccludedLight::All,
         }),
         ..base.clone().with_samples(|s| s.pixel_filter = PixelFilter::Tent)

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use skylit::Error;
 use skylit::film::camera::CameraRecord;
+use skylit::integrators::ao::Occlusion;
 use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings, Technique};
 use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Scene};
@@ -43,7 +44,7 @@ fn ways() -> [(&'static str, Settings); 5] {
     [
         ("one ray a pixel", settings()),
         ("four rays a pixel", Settings { rays_per_pixel: 4, history: 16, ..settings() }),
-        ("with a falloff", Settings { falloff: 1.5, ..settings() }),
+        ("with a falloff", Settings { occlusion: Occlusion::new(f64::INFINITY, 1.5), ..settings() }),
         ("not filtered", filtered(FilterKind::None, 0)),
         ("in three steps", filtered(FilterKind::Atrous, 7)),
     ]

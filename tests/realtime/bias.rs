@@ -1,6 +1,7 @@
 //! Means over images, with and without filter, against closed forms and against many rays.
 
 use glam::DVec3;
+use skylit::integrators::ao::Occlusion;
 use skylit::oracle::closed_form as exact;
 use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
 use skylit::sampling::Sequence;
@@ -90,7 +91,7 @@ fn gpu_filters_keep_the_mean_where_there_is_detail() {
         let scene = scene(name);
         let tracer = tracer(&device, kind, &scene);
         let camera = record(&scene, &scene.cameras[0], SIZE);
-        let base = Settings { falloff, ..traced(Preset::Balanced) };
+        let base = Settings { occlusion: Occlusion::new(f64::INFINITY, falloff), ..traced(Preset::Balanced) };
         let want = reference(&tracer, SIZE, &base, &camera);
         // 256 well distributed rays in each of 5184 pixels: below that of independent ones
         let floor = 0.5 / (256.0 * f64::from(SIZE[0] * SIZE[1])).sqrt();

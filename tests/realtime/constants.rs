@@ -1,6 +1,7 @@
 //! Where the answer is the same everywhere it comes out exactly, in every frame.
 
 use glam::DVec3;
+use skylit::integrators::ao::Occlusion;
 use skylit::realtime::{Filter, FilterKind, Preset, Settings};
 use skylit::scene::Scene;
 use skylit::scene::builtin::{SceneTransform, analytic};
@@ -11,12 +12,13 @@ use crate::{realtime, stepped, traced};
 
 /// All that trace, and the filter that no preset has.
 fn pipelines(falloff: f64) -> Vec<(String, Settings)> {
+    let occlusion = Occlusion::new(f64::INFINITY, falloff);
     let presets = Preset::ALL.into_iter().filter(|p| *p != Preset::Larsen);
-    let mut all: Vec<_> = presets.map(|p| (p.name().to_owned(), Settings { falloff, ..traced(p) })).collect();
+    let mut all: Vec<_> = presets.map(|p| (p.name().to_owned(), Settings { occlusion, ..traced(p) })).collect();
     let base = traced(Preset::Balanced);
     let filter = Filter { kind: FilterKind::Atrous, radius: 7, ..base.filter };
     // the first frames rest on few samples: all of the box is in use
-    all.push((filter.kind.name().to_owned(), Settings { filter, falloff, ..base }));
+    all.push((filter.kind.name().to_owned(), Settings { filter, occlusion, ..base }));
     all
 }
 

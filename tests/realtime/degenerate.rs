@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
-use skylit::integrators::ao::Hemisphere;
+use skylit::integrators::ao::{Hemisphere, Occlusion};
 use skylit::realtime::{Preset, Settings, Technique};
 use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Geometry, Projection, Scene};
@@ -16,8 +16,12 @@ const SMALL: [u32; 2] = [32, 18];
 /// Settings whose arithmetic differs.
 fn pipelines() -> Vec<Settings> {
     vec![
-        Settings { falloff: 8.0, ..traced(Preset::Balanced) },
-        Settings { hemisphere: Hemisphere::Shading, rays_per_pixel: 3, ..traced(Preset::LarsenFixed) },
+        Settings { occlusion: Occlusion::new(f64::INFINITY, 8.0), ..traced(Preset::Balanced) },
+        Settings {
+            occlusion: Occlusion { hemisphere: Hemisphere::Shading, ..Default::default() },
+            rays_per_pixel: 3,
+            ..traced(Preset::LarsenFixed)
+        },
         Settings { technique: Technique::Gtao, ..traced(Preset::Fast) },
         traced(Preset::Larsen),
     ]

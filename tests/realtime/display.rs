@@ -5,6 +5,7 @@ use skylit::Error;
 use skylit::accel::flatten::FlatScene;
 use skylit::colour::srgb_byte;
 use skylit::film::camera::CameraRecord;
+use skylit::integrators::ao::Occlusion;
 use skylit::output::tone_map::ToneMap;
 use skylit::ray::Ray;
 use skylit::realtime::display::{Display, DisplayMode};
@@ -57,7 +58,7 @@ fn gpu_displayed_visibility_has_the_bytes_of_a_png() {
         let tracer = tracer(&device, kind, &scene);
         for preset in [Preset::Balanced, Preset::Larsen] {
             // with a falloff samples take all values
-            let settings = Settings { falloff: 2.0, ..preset.settings() };
+            let settings = Settings { occlusion: Occlusion::new(f64::INFINITY, 2.0), ..preset.settings() };
             let mut realtime = Realtime::new(&tracer, SIZE, &settings, &[]).unwrap();
             let mut bytes = std::collections::BTreeSet::new();
             for exposure in [0.0, 0.7, -1.6, -3.3f32] {

@@ -5,7 +5,7 @@
 //! on the other side has crept over the edge; the bits must be the same.
 
 use glam::{DVec3, Vec3};
-use skylit::integrators::ao::Hemisphere;
+use skylit::integrators::ao::{Hemisphere, Occlusion};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
@@ -54,7 +54,10 @@ fn shown(oracle: &Oracle, camera: &Camera) -> Vec<DisplayMode> {
 #[test]
 fn gpu_nothing_crosses_an_edge_in_depth() {
     let device = device();
-    let base = Settings { hemisphere: Hemisphere::Shading, ..traced(Preset::Balanced) };
+    let base = Settings {
+        occlusion: Occlusion { hemisphere: Hemisphere::Shading, ..Default::default() },
+        ..traced(Preset::Balanced)
+    };
     let wide = |kind| Filter { kind, radius: 7, samples: 4096.0 };
     // what is filtered does not depend on the tracer
     for kind in tracers(&device).into_iter().take(1) {

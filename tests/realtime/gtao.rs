@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
+use skylit::integrators::ao::Occlusion;
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::{Oracle, OracleRay, ao as oracle_ao, closed_form as exact};
 use skylit::realtime::{GtaoConstants, Preset, Settings, Technique};
@@ -62,7 +63,7 @@ fn gpu_screen_space_a_plane_is_one() {
             let seen = Camera::look_at(eye, target, DVec3::Y, fov);
             let parallel = Camera { projection: Projection::Orthographic { half_height: 4.0 }, ..seen.clone() };
             for camera in [seen.clone(), rolled(&seen, 35.0), parallel] {
-                for settings in [sparse(), Settings { radius: 2.0, ..sparse() }] {
+                for settings in [sparse(), Settings { occlusion: Occlusion::new(2.0, 1.0), ..sparse() }] {
                     let (image, cover) = image(tracer, &settings, &record(&scene, &camera, SIZE));
                     let values: Vec<f64> =
                         (0..image.len()).filter(|&i| cover[i] > 0.0).map(|i| f64::from(image[i])).collect();

@@ -4,6 +4,7 @@ use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
+use skylit::integrators::ao::Occlusion;
 use skylit::integrators::aov;
 use skylit::oracle::{Oracle, OracleRay};
 use skylit::realtime::{Preset, Realtime, Settings};
@@ -27,7 +28,13 @@ fn tracer(device: &std::sync::Arc<skylit::gpu::Device>, kind: TracerKind, scene:
 }
 
 fn larsen(tracer: &Tracer, size: [u32; 2], falloff: f64, lights: &[[f32; 3]]) -> Realtime {
-    Realtime::new(tracer, size, &Settings { falloff, ..traced(Preset::Larsen) }, lights).unwrap()
+    Realtime::new(
+        tracer,
+        size,
+        &Settings { occlusion: Occlusion::new(f64::INFINITY, falloff), ..traced(Preset::Larsen) },
+        lights,
+    )
+    .unwrap()
 }
 
 fn all(values: &[f32], want: f32) -> bool {

@@ -84,9 +84,7 @@ fn frames(realtime: &mut Realtime, tracer: &Tracer, camera: &CameraRecord, count
 /// What an image with many rays says, without history and filter: a quarter of the preset's, which leaves an error of 0.01.
 fn reference(tracer: &Tracer, size: [u32; 2], like: &Settings, camera: &CameraRecord) -> Vec<f32> {
     let settings = Settings {
-        radius: like.radius,
-        falloff: like.falloff,
-        hemisphere: like.hemisphere,
+        occlusion: like.occlusion,
         // of none of the seeds under test
         seed: 77,
         rays_per_pixel: 256,

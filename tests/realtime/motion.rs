@@ -9,6 +9,7 @@ use skylit::colour::srgb_byte;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
+use skylit::integrators::ao::Occlusion;
 use skylit::integrators::aov;
 use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
@@ -432,7 +433,7 @@ fn gpu_what_moves_far_away_costs_no_history() {
     let device = device();
     let scene = block_on_a_floor();
     let camera = record(&scene, &scene.cameras[0], SIZE);
-    let settings = Settings { radius: 1.0, filter: NO_FILTER, ..traced(Preset::Balanced) };
+    let settings = Settings { occlusion: Occlusion::new(1.0, 1.0), filter: NO_FILTER, ..traced(Preset::Balanced) };
     for kind in one_tracer(&device) {
         let mut tracer = moving(&device, kind, &scene, vec![1]);
         let mut realtime = realtime(&tracer, SIZE, &settings);

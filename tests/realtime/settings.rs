@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use skylit::Error;
+use skylit::integrators::ao::Occlusion;
 use skylit::realtime::{Filter, Preset, Realtime, Resolution, Settings, Technique};
 use skylit::sampling::Sequence;
 use skylit::scene::builtin::{SceneTransform, analytic};
@@ -23,12 +24,12 @@ fn settings_out_of_range_are_named() {
         (Settings { rays_per_pixel: 0, ..good }, "rays per pixel"),
         (Settings { rays_per_pixel: Settings::MAX_RAYS + 1, ..good }, "rays per pixel"),
         (Settings { history: 0, ..good }, "history"),
-        (Settings { radius: 0.0, ..good }, "radius"),
-        (Settings { radius: f64::NAN, ..good }, "radius"),
-        (Settings { radius: -1.0, ..good }, "radius"),
-        (Settings { falloff: 0.5, ..good }, "falloff"),
-        (Settings { falloff: f64::NAN, ..good }, "falloff"),
-        (Settings { falloff: f64::INFINITY, ..good }, "falloff"),
+        (Settings { occlusion: Occlusion::new(0.0, 1.0), ..good }, "radius"),
+        (Settings { occlusion: Occlusion::new(f64::NAN, 1.0), ..good }, "radius"),
+        (Settings { occlusion: Occlusion::new(-1.0, 1.0), ..good }, "radius"),
+        (Settings { occlusion: Occlusion::new(f64::INFINITY, 0.5), ..good }, "falloff"),
+        (Settings { occlusion: Occlusion::new(f64::INFINITY, f64::NAN), ..good }, "falloff"),
+        (Settings { occlusion: Occlusion::new(f64::INFINITY, f64::INFINITY), ..good }, "falloff"),
         (Settings { clamp: -1.0, ..good }, "clamp"),
         (Settings { clamp: f32::NAN, ..good }, "clamp"),
         (Settings { moved_weight: -0.1, ..good }, "moved weight"),
@@ -134,8 +135,14 @@ fn gpu_rays_of_one_frame_or_of_many_are_the_same_rays() {
         // any hit, and nearest hits
         let falloffs = if kind == TracerKind::Compute { &[1.0, 5.0][..] } else { &[5.0] };
         for &falloff in falloffs {
-            let base =
-                Settings { sequence: Sequence::Sobol, filter: NO_FILTER, falloff, history: 64, ..traced(Preset::Fast) };
+            let occlusion = Occlusion::new(f64::INFINITY, falloff);
+            let base = Settings {
+                sequence: Sequence::Sobol,
+                filter: NO_FILTER,
+                occlusion,
+                history: 64,
+                ..traced(Preset::Fast)
+            };
             let run = |rays: u32, count: u32| {
                 let mut realtime = realtime(&tracer, SIZE, &Settings { rays_per_pixel: rays, ..base });
                 frames(&mut realtime, &tracer, &stepped(&scene, SIZE, DVec3::ZERO), count);

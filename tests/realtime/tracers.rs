@@ -1,6 +1,7 @@
 //! Three tracers, one image; rasterized or traced, one image; the same run, the same bits.
 
 use glam::DVec3;
+use skylit::integrators::ao::Occlusion;
 use skylit::raster::Primary;
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::Scene;
@@ -40,7 +41,7 @@ fn gpu_three_tracers_one_image() {
     let kinds = tracers(&device);
     for (name, falloff) in [("leaf-cards", 1.0), ("cornell-spheres", 4.0), ("grid:2", 1.0), ("stairs", 4.0)] {
         let scene = scene(name);
-        let settings = Settings { falloff, radius: 3.0, ..traced(Preset::Balanced) };
+        let settings = Settings { occlusion: Occlusion::new(3.0, falloff), ..traced(Preset::Balanced) };
         let runs: Vec<_> = kinds.iter().map(|&kind| run(&tracer(&device, kind, &scene), &scene, &settings)).collect();
         for (kind, other) in kinds.iter().zip(&runs).skip(1) {
             let (shares, by) = differences(&runs[0], other);
@@ -88,7 +89,10 @@ fn gpu_the_same_run_has_the_same_bits_and_another_seed_other_noise() {
     let whole = |run: &[[Vec<f32>; 3]]| run.iter().flatten().map(|v| bits(v)).collect::<Vec<_>>();
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
-        for settings in [traced(Preset::Fast), Settings { falloff: 3.0, ..traced(Preset::Quality) }] {
+        for settings in [
+            traced(Preset::Fast),
+            Settings { occlusion: Occlusion::new(f64::INFINITY, 3.0), ..traced(Preset::Quality) },
+        ] {
             let first = run(&tracer, &scene, &settings);
             assert!(whole(&first) == whole(&run(&tracer, &scene, &settings)), "{kind}: other bits");
             let other = run(&tracer, &scene, &Settings { seed: 5, ..settings });

@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec2};
 use skylit::film::camera::CameraRecord;
 use skylit::film::{NoControl, SampleSettings};
 use skylit::gpu::Device;
-use skylit::integrators::ao::{self, AoOptions};
+use skylit::integrators::ao::{self, AoOptions, Occlusion};
 use skylit::integrators::rays::Mode;
 use skylit::measure::parity::{judge_any, judge_closest, judge_weights};
 use skylit::measure::ray_sets::{mixed_rays, narrow, random_rays};
@@ -341,7 +341,11 @@ fn gpu_kernel_empty_queues() {
         for falloff in [1.0, 3.0] {
             for (towards, seen) in [(target, true), (eye * 2.0 - target, false)] {
                 let camera = CameraRecord::new(&Camera::look_at(eye, towards, DVec3::Y, 0.3), scene.origin(), 1.0);
-                let options = AoOptions { samples: SampleSettings::new([70, 33], 3, 0), falloff, ..Default::default() };
+                let options = AoOptions {
+                    samples: SampleSettings::new([70, 33], 3, 0),
+                    occlusion: Occlusion::new(f64::INFINITY, falloff),
+                    ..Default::default()
+                };
                 let image = ao::render(&tracer, &camera, &options, &mut NoControl).unwrap();
                 let covered = image.image.film.coverage.iter().filter(|&&c| c > 0.0).count();
                 assert_eq!(covered > 0, seen, "{kind}: {covered} pixels covered");

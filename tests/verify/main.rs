@@ -6,6 +6,7 @@ mod common;
 mod chosen;
 mod defects;
 mod program;
+mod tolerance;
 
 use std::path::Path;
 

@@ -4,6 +4,8 @@
 mod common;
 
 mod images;
+mod layer;
 mod panels;
 mod script;
+mod technique;
 mod views;

@@ -1,6 +1,7 @@
 //! The presets that are compared; those of ambient occlusion all with the same occlusion settings.
 
 use crate::error::{Error, Result};
+use crate::integrators::ao::Occlusion;
 use crate::raster::Primary;
 use crate::realtime::{Preset, Settings, Technique};
 
@@ -47,41 +48,39 @@ impl Candidate {
     }
 }
 
-/// Occlusion settings of a scene.
+/// Occlusion settings of a scene, the same for all pipelines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Occlusion {
-    /// Occlusion radius, scene units.
-    pub reach: f64,
-    falloff: f64,
-    binary: bool,
+pub struct CommonOcclusion {
+    occlusion: Occlusion,
+    /// Length unit of the `larsen` pipeline, with which its falloff, or its ray length, matches.
+    unit: f64,
 }
 
-impl Occlusion {
+impl CommonOcclusion {
     /// Up to `reach` scene units, all alike (`binary`) or fading to [`MIN_WEIGHT`] there.
     ///
     /// # Errors
     /// [`Error::Scene`] for a scene so small that the falloff per scene unit is not finite.
     pub fn new(reach: f64, binary: bool) -> Result<Self> {
-        let falloff = if binary { 1.0 } else { MIN_WEIGHT.powf(-1.0 / reach) };
-        if falloff.is_finite() && reach > 0.0 {
-            return Ok(Self { reach, falloff, binary });
+        let (occlusion, unit) = if binary {
+            (Occlusion::new(reach, 1.0), reach / THEIR_REACH)
+        } else {
+            let fading = Occlusion::new(f64::INFINITY, MIN_WEIGHT.powf(-1.0 / reach));
+            (fading, reach * THEIR_FALLOFF.ln() / -MIN_WEIGHT.ln())
+        };
+        if occlusion.falloff.is_finite() && reach > 0.0 {
+            return Ok(Self { occlusion, unit });
         }
         Err(Error::Scene(format!(
             "occlusion that fades over {reach} scene units is too steep to compute: scale the scene up, or use --ao-falloff binary"
         )))
     }
 
-    /// Settings with this occlusion. The length unit of the `larsen` pipeline is chosen so that its
-    /// falloff, or its ray length, matches.
+    /// Settings with this occlusion.
     pub fn apply_to(&self, settings: Settings) -> Settings {
-        let (radius, unit) = if self.binary {
-            (self.reach, self.reach / THEIR_REACH)
-        } else {
-            (f64::INFINITY, self.reach * THEIR_FALLOFF.ln() / -MIN_WEIGHT.ln())
-        };
         let is_larsen = settings.technique == Technique::Larsen;
         let primary = if is_larsen { Some(Primary::Traced) } else { settings.primary };
-        Settings { radius, falloff: self.falloff, unit, primary, ..settings }
+        Settings { occlusion: self.occlusion, unit: self.unit, primary, ..settings }
     }
 }
 
@@ -91,21 +90,21 @@ mod tests {
 
     #[test]
     fn both_pipelines_fade_alike() {
-        let occlusion = Occlusion::new(60.0, false).unwrap();
+        let occlusion = CommonOcclusion::new(60.0, false).unwrap();
         let s = occlusion.apply_to(CANDIDATES[0].preset.settings());
-        assert!((s.falloff.powf(-60.0) - MIN_WEIGHT).abs() < 1e-12);
+        assert!((s.occlusion.falloff.powf(-60.0) - MIN_WEIGHT).abs() < 1e-12);
         // theirs: 8 to the distance in units of its own
         assert!((THEIR_FALLOFF.powf(-60.0 / s.unit) - MIN_WEIGHT).abs() < 1e-12);
         assert!(s.technique == Technique::Larsen && (s.unit * 2.66 / 60.0 - 1.0).abs() < 0.01);
-        let binary = Occlusion::new(2.0, true).unwrap().apply_to(CANDIDATES[3].preset.settings());
-        assert_eq!((binary.radius, binary.falloff, binary.unit), (2.0, 1.0, 0.02));
+        let binary = CommonOcclusion::new(2.0, true).unwrap().apply_to(CANDIDATES[3].preset.settings());
+        assert_eq!((binary.occlusion, binary.unit), (Occlusion::new(2.0, 1.0), 0.02));
         assert_eq!(CANDIDATES[5].technique, Some(Technique::Gtao));
         assert_eq!(s.primary, Some(Primary::Traced));
     }
 
     #[test]
     fn what_is_too_small_is_said() {
-        assert_eq!(Occlusion::new(0.001, false).unwrap_err().exit_code(), 3);
-        assert!(Occlusion::new(0.001, true).is_ok());
+        assert_eq!(CommonOcclusion::new(0.001, false).unwrap_err().exit_code(), 3);
+        assert!(CommonOcclusion::new(0.001, true).is_ok());
     }
 }

@@ -15,7 +15,7 @@ use crate::film::camera::CameraRecord;
 use crate::measure::displayed::{Displayed, FrameReference};
 use crate::measure::plain_time::{PlainClock, is_plain_timed};
 use crate::measure::stale::FreshImages;
-use crate::measure::temporal::{Ghosting, LagCurve, Residual, recovery};
+use crate::measure::temporal::{Ghosting, LagCurve, recovery};
 use crate::realtime::{Preset, Realtime, surface_masks};
 use crate::scene::builtin::moving_box::Mover;
 use crate::scene::{Camera, EnvironmentMap};
@@ -287,7 +287,8 @@ impl Lag {
     ) -> Self {
         let references = (&reference.displayed.coded[..], &old.displayed.coded[..]);
         let share = |image: &Displayed, beside: &Displayed, ghosting: &mut Ghosting| {
-            add_ghost(ghosting, (&image.coded, &beside.coded), references, mask).map_or(f64::NAN, |r| r.share)
+            let added = ghosting.add_beside((&image.coded, &beside.coded), references, mask);
+            added.map_or(f64::NAN, |r| r.share)
         };
         let Some(settled) = fresh.last() else {
             let none = || LagCurve::new(Vec::new());
@@ -301,49 +302,5 @@ impl Lag {
             |(image, fresh): (&Displayed, &Displayed)| share(image, fresh, &mut Ghosting::default()) / all;
         let memory = images.iter().zip(fresh).map(of_that_age).collect();
         Self { left: LagCurve::new(left), memory: LagCurve::new(memory), ghosting: ghosting.energy() }
-    }
-}
-
-/// Adds to `ghosting` the share of `old`, the reference before the change, in an image. `settled`
-/// is its final state, whose errors are no ghosts. `mask`: a value per pixel, above 0 where pixels
-/// take part. `None` where nothing differs.
-pub fn add_ghost(
-    ghosting: &mut Ghosting,
-    (image, settled): (&[f32], &[f32]),
-    (reference, old): (&[f32], &[f32]),
-    mask: Option<&[f32]>,
-) -> Option<Residual> {
-    // as if it settled at the reference
-    let shifted: Vec<f32> = image.iter().zip(settled).zip(reference).map(|((v, s), t)| v - s + t).collect();
-    // a value a channel
-    let mask: Option<Vec<f32>> = mask.map(|mask| {
-        let channels = image.len() / mask.len().max(1);
-        mask.iter().flat_map(|&m| std::iter::repeat_n(m, channels)).collect()
-    });
-    ghosting.add(&shifted, reference, old, mask.as_deref())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lasting_error_is_no_ghost() {
-        let (old, new) = ([0.0, 1.0], [1.0, 0.0]);
-        // it ends a tenth too bright, and a quarter of the old is left
-        let settled = [1.1, 0.1];
-        let image = [0.85, 0.35];
-        let mut ghosting = Ghosting::default();
-        let left = add_ghost(&mut ghosting, (&image, &settled), (&new, &old), None).unwrap();
-        assert!((left.share - 0.25).abs() < 1e-6 && (ghosting.energy() - 0.0625).abs() < 1e-6);
-    }
-
-    /// Two pixels of three channels, of which the second counts.
-    #[test]
-    fn a_pixel_counts_with_all_channels() {
-        let (old, new) = ([0.0; 6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-        let image = [9.0, 9.0, 9.0, 0.5, 0.5, 0.5];
-        let left = add_ghost(&mut Ghosting::default(), (&image, &new), (&new, &old), Some(&[0.0, 1.0])).unwrap();
-        assert!(left.pixels == 3 && (left.share - 0.5).abs() < 1e-6, "{left:?}");
     }
 }

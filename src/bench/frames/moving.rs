@@ -2,7 +2,6 @@
 
 use super::args::FramesSession;
 use super::candidates::Candidate;
-use super::change::add_ghost;
 use super::frame_log::{FrameLog, first_timed, measured};
 use super::signal::EqualTime;
 use super::stage::{DenoisedImage, Motion, PLAIN_SEED, PlainImage, SceneStage};
@@ -124,7 +123,7 @@ fn measure_preset(
         let settled = stage.frames_afresh(&mut realtime, &inputs.camera, frames)?.pop().unwrap_or_default();
         let [image, settled] = [image, &settled].map(|image| stage.displayed(image).coded);
         let references = (&m.reference.displayed.coded[..], &old.displayed.coded[..]);
-        shares.extend(add_ghost(&mut ghosting, (&image, &settled), references, Some(mask)).map(|r| r.share));
+        shares.extend(ghosting.add_beside((&image, &settled), references, Some(mask)).map(|r| r.share));
     }
 
     // all of it into the record

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::DMat3;
 
 use super::args::{BenchFramesArgs, FalloffChoice};
-use super::candidates::{Candidate, Occlusion};
+use super::candidates::{Candidate, CommonOcclusion};
 use super::frame_log::TypicalFrame;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
@@ -34,7 +34,7 @@ const MAX_RAYS: u32 = 256;
 pub struct Signal {
     settings: RenderSettings,
     size: [u32; 2],
-    occlusion: Option<Occlusion>,
+    occlusion: Option<CommonOcclusion>,
 }
 
 impl Signal {
@@ -48,7 +48,7 @@ impl Signal {
         if args.is_occlusion() {
             // through the middles of pixels, which all presets can
             settings.frames.antialias = Some(Antialias::Off);
-            occlusion = Some(Occlusion::new(reach, args.ao_falloff == FalloffChoice::Binary)?);
+            occlusion = Some(CommonOcclusion::new(reach, args.ao_falloff == FalloffChoice::Binary)?);
         } else if args.integrator().get().capabilities().contains(&Capability::AmbientOcclusion) {
             settings.integrators.ao.ao_radius = Some(Length::Units(reach));
         }

@@ -27,7 +27,7 @@ pub use report::{ChoiceRecord, CurveRecord, ErrorParts, FitRecord, LightShares, 
 
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::integrators::ao::{Attenuation, Hemisphere};
+use crate::integrators::ao::{Hemisphere, Occlusion};
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::path::ambient::EnvironmentLight;
 use crate::output::{Channel, Image, Samples as Values};
@@ -239,7 +239,7 @@ pub fn run(
     // Puts together images and figures.
     let direct =
         references.lights.as_ref().filter(|_| light == EnvironmentLight::Ambient).unwrap_or(&references.direct);
-    let image = picture(settings.size, &references, &path, direct, choice.attenuation, choice.ambient);
+    let image = picture(settings.size, &references, &path, direct, choice.occlusion, choice.ambient);
     let shares = LightShares::new(&references, &diffuse);
     let mut counted = vec![0.0; references.samples.pixels()];
     diffuse.iter().for_each(|&p| counted[p] = 1.0);
@@ -299,7 +299,7 @@ fn picture(
     references: &References,
     path: &Halves,
     direct: &Halves,
-    attenuation: Attenuation,
+    occlusion: Occlusion,
     color: [f64; 3],
 ) -> Image {
     let samples = &references.samples;
@@ -311,13 +311,13 @@ fn picture(
         }
     };
     let rgb = ["R", "G", "B"];
-    planes("", &rgb, &lit(direct, &samples.ambient(attenuation), color));
+    planes("", &rgb, &lit(direct, &samples.ambient(occlusion), color));
     planes("path.", &rgb, &mean(path));
     planes("direct.", &rgb, &mean(direct));
     let mut alpha = vec![0.0; samples.pixels()];
     samples.covered().into_iter().for_each(|p| alpha[p] = 1.0);
     planes("", &["A"], &alpha);
-    planes("ao.", &["Y"], &mean(&samples.visibility(attenuation)));
+    planes("ao.", &["Y"], &mean(&samples.visibility(occlusion)));
     planes("sky.", &["Y"], &mean(&references.sky));
     Image { width: size[0], height: size[1], channels, metadata: vec![("integrator".into(), "lit".into())] }
 }

@@ -7,7 +7,7 @@ use super::samples::Samples;
 use super::search::{Choice, Curve, Found};
 use super::sums::Target;
 use super::{PathFit, combine, lit, mean};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 use crate::integrators::path::ambient::EnvironmentLight;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
@@ -166,7 +166,7 @@ impl LightShares {
 
 impl ChoiceRecord {
     fn new(choice: &Choice, channels: usize) -> Self {
-        let Attenuation { radius, falloff } = choice.attenuation;
+        let Occlusion { radius, falloff, .. } = choice.occlusion;
         Self {
             radius: finite(radius),
             falloff,
@@ -282,7 +282,7 @@ fn scaled(signal: &Halves, color: [f64; 3], channels: usize) -> Halves {
     [0, 1].map(|h| signal[h].iter().enumerate().map(|(k, v)| v * color[k % channels] as f32).collect())
 }
 
-const UNLIMITED: Attenuation = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
+const UNLIMITED: Occlusion = Occlusion::new(f64::INFINITY, 1.0);
 
 /// The record of a fit against path tracing.
 pub(super) fn fit_record(fit: &PathFit, light: EnvironmentLight) -> FitRecord {
@@ -300,7 +300,7 @@ pub(super) fn fit_record(fit: &PathFit, light: EnvironmentLight) -> FitRecord {
     let color = rows.fitted("ao-sky in place of AO", &sky);
     // error = (sky - target) + (ao - sky)
     let sky = scaled(&sky, color, 3);
-    let ambient = samples.ambient(found.best.attenuation);
+    let ambient = samples.ambient(found.best.occlusion);
     let ao = scaled(&ambient, found.best.ambient, 3);
     let (transport, occlusion) = (combine(&sky, &target.halves, |a, b| a - b), combine(&ao, &sky, |a, b| a - b));
     let values = target.values();
@@ -331,7 +331,7 @@ pub(super) fn sky_record(samples: &Samples, target: &Target, found: &Found) -> F
     rows.choice("AO with the best radius", &found.binary);
     rows.choice("AO with the best falloff", &found.falloff);
     rows.choice("AO with the best radius and falloff", &found.both);
-    let best = mean(&scaled(&samples.visibility(found.best.attenuation), found.best.ambient, 1));
+    let best = mean(&scaled(&samples.visibility(found.best.occlusion), found.best.ambient, 1));
     record(None, target, found, rows.rows, None, metrics(&best, &mean(&target.halves), target, &target.pixels))
 }
 
@@ -354,7 +354,7 @@ fn record(
         binary: choice(&found.binary),
         falloff: choice(&found.falloff),
         both: choice(&found.both),
-        good_radii: found.curves.first().map_or([None; 2], |c| good_radii(c, found.binary.attenuation.radius)),
+        good_radii: found.curves.first().map_or([None; 2], |c| good_radii(c, found.binary.occlusion.radius)),
         parts,
         metrics,
         curves: found.curves.iter().map(curve_record).collect(),

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 use crate::integrators::path::ambient::AmbientSample;
 
 /// Maximum memory of samples, bytes.
@@ -94,8 +94,8 @@ impl Samples {
     }
 
     /// Ambient light of radiance 1 that surfaces reflect, linear RGB.
-    pub fn ambient(&self, attenuation: Attenuation) -> [Vec<f32>; 2] {
-        let falloff = Falloff::new(attenuation);
+    pub fn ambient(&self, occlusion: Occlusion) -> [Vec<f32>; 2] {
+        let falloff = Falloff::new(occlusion);
         self.image(3, |samples, out| {
             let n = samples.len() as f32;
             for s in samples {
@@ -106,8 +106,8 @@ impl Samples {
     }
 
     /// Ambient visibility. Samples of surfaces that reflect no ambient light count 0.
-    pub fn visibility(&self, attenuation: Attenuation) -> [Vec<f32>; 2] {
-        let falloff = Falloff::new(attenuation);
+    pub fn visibility(&self, occlusion: Occlusion) -> [Vec<f32>; 2] {
+        let falloff = Falloff::new(occlusion);
         self.image(1, |samples, out| {
             let open = samples.iter().filter(|s| reflects(s)).map(|s| 1.0 - falloff.occlusion(s.distance)).sum::<f32>();
             out[0] = open / samples.len() as f32;
@@ -129,8 +129,8 @@ pub struct Falloff {
 
 impl Falloff {
     /// That of a radius and falloff.
-    pub fn new(attenuation: Attenuation) -> Self {
-        Self { log2: attenuation.falloff_log2() as f32, reach: attenuation.reach() as f32 }
+    pub fn new(occlusion: Occlusion) -> Self {
+        Self { log2: occlusion.falloff_log2() as f32, reach: occlusion.reach() as f32 }
     }
 
     /// Occlusion of a hit at a distance; infinite distances are misses.
@@ -161,14 +161,14 @@ mod tests {
             samples.add(half, 1, &[mirror, hit(3.0)]);
         }
         assert_eq!((samples.covered(), samples.diffuse()), (vec![0, 1], vec![0]));
-        let binary = |radius| Attenuation { radius, falloff: 1.0 };
+        let binary = |radius| Occlusion::new(radius, 1.0);
         assert_eq!(samples.visibility(binary(1.0))[1][0], 1.0);
         assert_eq!(samples.visibility(binary(1.5))[0][0], 0.5);
         assert_eq!(samples.ambient(binary(1.5))[0][..3], [0.25, 0.125, 0.0]);
         assert_eq!(samples.ambient(binary(1.5))[0][3..6], [0.25, 0.125, 0.0]);
         assert_eq!(samples.reflectance()[0][3..6], [0.25, 0.125, 0.0]);
         // half of the hit at distance 1 counts
-        let halves = Attenuation { radius: f64::INFINITY, falloff: 2.0 };
+        let halves = Occlusion::new(f64::INFINITY, 2.0);
         assert!((samples.visibility(halves)[0][0] - 0.75).abs() < 1e-6);
     }
 

@@ -3,7 +3,7 @@
 
 use super::samples::Samples;
 use super::sums::{GROUPS, Sums, Table, Target};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 
 /// Radii of the coarse grid: per octave, and octaves below the scene's diagonal.
 const COARSE: (f64, f64) = (4.0, 12.0);
@@ -25,7 +25,7 @@ const GAIN: f64 = 0.01;
 /// A radius and falloff with the best ambient radiance for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    pub attenuation: Attenuation,
+    pub occlusion: Occlusion,
     /// Ambient radiance, linear RGB; grey targets have it in the first channel.
     pub ambient: [f64; 3],
     /// Mean squared error against the target.
@@ -92,7 +92,7 @@ impl Searcher<'_> {
     fn evaluate(&self, log2: f64, radius: f64, log_error: Option<f64>) -> Choice {
         let sums = Table::evaluate(self.samples, self.target, &[log2], &[radius]).sums(0, 0, None);
         let mse = (self.target.energy() - sums.explained()) / self.target.values().max(1.0);
-        Choice { attenuation: Attenuation { radius, falloff: log2.exp2() }, ambient: sums.ambient(), mse, log_error }
+        Choice { occlusion: Occlusion::new(radius, log2.exp2()), ambient: sums.ambient(), mse, log_error }
     }
 
     fn binary(&self, coarse: &Table) -> Choice {
@@ -257,16 +257,16 @@ mod tests {
     fn what_was_put_in_is_found() {
         let samples = occluded(|pixel| 0.1 + 40.0 * (pixel % 97) as f32 / 97.0);
         for (radius, falloff) in [(5.0, 1.0), (f64::INFINITY, 1.25)] {
-            let image = samples.ambient(Attenuation { radius, falloff });
+            let image = samples.ambient(Occlusion::new(radius, falloff));
             let tinted = image.map(|half| half.iter().enumerate().map(|(k, v)| v * [2.0, 1.0, 0.5][k % 3]).collect());
             let target = Target { channels: 3, halves: tinted, pixels: samples.diffuse(), width: 64 };
             let found = search(&samples, &target, 100.0);
             let best = found.best;
             println!("{best:?}");
             if falloff == 1.0 {
-                assert!((best.attenuation.radius / radius - 1.0).abs() < 0.02 && best.attenuation.falloff == 1.0);
+                assert!((best.occlusion.radius / radius - 1.0).abs() < 0.02 && best.occlusion.falloff == 1.0);
             } else {
-                assert!((best.attenuation.falloff.ln() / falloff.ln() - 1.0).abs() < 0.02, "{best:?}");
+                assert!((best.occlusion.falloff.ln() / falloff.ln() - 1.0).abs() < 0.02, "{best:?}");
             }
             assert!(best.ambient.iter().zip([2.0, 1.0, 0.5]).all(|(a, b)| (a / b - 1.0).abs() < 0.01), "{best:?}");
             assert!(best.log_error.is_some_and(|e| e < 0.05), "{best:?}");

@@ -12,7 +12,7 @@ use std::ops::{AddAssign, Sub};
 use rayon::prelude::*;
 
 use super::samples::{Falloff, Samples, reflects};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 
 /// Groups of image tiles, each of which is left out once to estimate standard errors (jackknife).
 pub const GROUPS: usize = 8;
@@ -213,7 +213,7 @@ struct PixelSums {
 
 impl PixelSums {
     fn new(samples: &Samples, falloffs: &[f64], radii: &[f64]) -> Self {
-        let unlimited = |log2: &f64| Falloff::new(Attenuation { radius: f64::INFINITY, falloff: log2.exp2() });
+        let unlimited = |log2: &f64| Falloff::new(Occlusion::new(f64::INFINITY, log2.exp2()));
         let first = || vec![0; samples.per_half()];
         let taken = || vec![[0.0; CHANNELS]; radii.len() + 1];
         Self {
@@ -309,17 +309,17 @@ mod tests {
     #[test]
     fn tables_agree_with_images() {
         let samples = scattered(300, 4);
-        let goal = samples.ambient(Attenuation { radius: 3.0, falloff: 1.2 });
+        let goal = samples.ambient(Occlusion::new(3.0, 1.2));
         let target = Target { channels: 3, halves: goal, pixels: (0..300).step_by(3).collect(), width: 100 };
         let (falloffs, radii) = ([0.0, 0.5, 1.2f64.log2()], [1.0, 3.0, f64::INFINITY]);
         let table = Table::evaluate(&samples, &target, &falloffs, &radii);
         for (f, log2) in falloffs.iter().enumerate() {
             for (r, radius) in radii.iter().enumerate() {
-                let attenuation = Attenuation { radius: *radius, falloff: log2.exp2() };
-                let (a, b) = (table.sums(f, r, None), target.sums(&samples.ambient(attenuation)));
+                let occlusion = Occlusion::new(*radius, log2.exp2());
+                let (a, b) = (table.sums(f, r, None), target.sums(&samples.ambient(occlusion)));
                 for c in 0..3 {
-                    assert!((a.xx[c] - b.xx[c]).abs() < 1e-4 * b.xx[c], "{attenuation:?}");
-                    assert!((a.xg[c] - b.xg[c]).abs() < 1e-4 * b.xg[c], "{attenuation:?}");
+                    assert!((a.xx[c] - b.xx[c]).abs() < 1e-4 * b.xx[c], "{occlusion:?}");
+                    assert!((a.xg[c] - b.xg[c]).abs() < 1e-4 * b.xg[c], "{occlusion:?}");
                 }
             }
         }

@@ -6,16 +6,16 @@
 //! pixel by pixel and in order. So camera rays that miss cost nothing more, neighbouring occlusion
 //! rays belong to one pixel, and sums do not depend on launch sizes.
 
-mod attenuation;
 mod hemisphere;
+mod occlusion;
 mod rays;
 mod report;
 pub mod settings;
 
 use std::sync::Arc;
 
-pub use attenuation::Attenuation;
 pub use hemisphere::Hemisphere;
+pub use occlusion::Occlusion;
 pub use rays::AoRays;
 
 use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
@@ -23,10 +23,12 @@ use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::accumulate::{Accumulated, Estimator, accumulate, max_rays};
-use crate::film::block::BlockParams;
+use crate::film::block::{BlockParams, PassParams};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
+use crate::interface::records::ao::AoParams;
+use crate::interface::records::film::FilmParams;
 use crate::output::Image;
 use crate::ray::Ray;
 use crate::settings::Capability;
@@ -45,25 +47,15 @@ const NO_HIT: f32 = -1.0;
 pub struct AoOptions {
     /// Settings of samples, of one occlusion ray each.
     pub samples: SampleSettings,
-    /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
-    pub radius: f64,
-    /// AO falloff c, at least 1: a hit at distance d occludes by c^-d; 1 is binary.
-    pub falloff: f64,
-    /// Axis of the hemisphere.
-    pub hemisphere: Hemisphere,
+    /// Which hits occlude.
+    pub occlusion: Occlusion,
     /// Consecutive samples of a pixel that share a camera ray: a power of two.
     pub rays: u32,
 }
 
 impl Default for AoOptions {
     fn default() -> Self {
-        Self {
-            samples: SampleSettings::default(),
-            radius: f64::INFINITY,
-            falloff: 1.0,
-            hemisphere: Hemisphere::Geometric,
-            rays: 1,
-        }
+        Self { samples: SampleSettings::default(), occlusion: Occlusion::default(), rays: 1 }
     }
 }
 
@@ -72,11 +64,6 @@ impl AoOptions {
     pub fn with_samples(mut self, change: impl FnOnce(&mut SampleSettings)) -> Self {
         change(&mut self.samples);
         self
-    }
-
-    /// Attenuation of occlusion with distance.
-    pub fn attenuation(&self) -> Attenuation {
-        Attenuation { radius: self.radius, falloff: self.falloff }
     }
 }
 
@@ -96,9 +83,7 @@ impl AmbientOcclusion {
         let ao = &job.settings.ao;
         AoOptions {
             samples: job.samples.clone(),
-            radius: ao.radius(),
-            falloff: ao.ao_falloff.unwrap_or(1.0),
-            hemisphere: ao.hemisphere(),
+            occlusion: ao.occlusion(),
             rays: ao.ao_rays.unwrap_or_else(|| default_rays(&job.samples)),
         }
     }
@@ -136,12 +121,11 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn needs(&self, settings: &IntegratorSettings) -> Needs {
-        Needs { normals: settings.ao.hemisphere() == Hemisphere::Shading, ..Default::default() }
+        Needs { normals: settings.ao.occlusion().is_about_shading_normals(), ..Default::default() }
     }
 
     fn streams(&self, settings: &IntegratorSettings) -> Vec<&'static StreamShaders> {
-        let falloff = settings.ao.ao_falloff.unwrap_or(1.0);
-        streams(&AoOptions { falloff, ..Default::default() }).to_vec()
+        rays::streams(settings.ao.occlusion()).to_vec()
     }
 
     /// A camera ray and an occlusion ray.
@@ -160,7 +144,7 @@ impl Integrator for AmbientOcclusion {
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
-        let AoOptions { samples, radius, falloff, hemisphere, rays } = Self::options(job);
+        let AoOptions { samples, occlusion, rays } = Self::options(job);
         let SampleSettings {
             size: _,
             spp: _,
@@ -171,15 +155,12 @@ impl Integrator for AmbientOcclusion {
             tile_mask: _,
             film: _,
         } = samples;
-        vec![
-            ("ao.radius", Some(radius.to_string())),
-            ("ao.falloff", Some(falloff.to_string())),
-            ("ao.normal", Some(hemisphere.to_string())),
-            // none of an image whose samples have a camera ray each, as images had before there was
-            // a choice
-            ("ao.rays", (rays > 1).then(|| rays.to_string())),
-            ("pixel_filter", Some(pixel_filter.to_string())),
-        ]
+        let mut identity = Vec::from(occlusion.metadata().map(|(key, text)| (key, Some(text))));
+        // none of an image whose samples have a camera ray each, as images had before there was a
+        // choice
+        identity.push(("ao.rays", (rays > 1).then(|| rays.to_string())));
+        identity.push(("pixel_filter", Some(pixel_filter.to_string())));
+        identity
     }
 
     fn render(
@@ -225,7 +206,9 @@ struct AoEstimator {
     rays: AoRays,
     has_entry_points: bool,
     resolve: ComputePipeline,
-    params: Buffer,
+    params: PassParams<AoParams>,
+    own: AoParams,
+    film: Buffer,
     dumps: Option<[Buffer; 2]>,
     kept: [Vec<Ray>; 2],
     // samples and camera rays of all launches, padding included
@@ -234,7 +217,7 @@ struct AoEstimator {
 
 /// The streams that [`render`] traces.
 pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
-    rays::streams(options.attenuation())
+    rays::streams(options.occlusion)
 }
 
 /// Renders ambient occlusion. [`accumulate`](crate::film::accumulate) says when it stops.
@@ -251,24 +234,19 @@ pub fn render(
     let samples = &options.samples;
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
+    let rays = AoRays::new(tracer, options.occlusion, most, sample_bits, options.rays.max(1).ilog2())?;
     let mut estimator = AoEstimator {
-        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits, options.rays.max(1).ilog2())?,
-        has_entry_points: false,
+        own: rays.params(options.occlusion.record(), camera),
+        has_entry_points: rays.has_entry_points(camera),
+        rays,
         resolve: shaders::RESOLVE.pipeline(device)?,
-        params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
+        params: PassParams::new(device, "parameters of ambient occlusion")?,
+        film: Buffer::new(device, "parameters of the film", size_of::<FilmParams>() as u64, Memory::Upload)?,
         dumps: if samples.keep_rays { Some([ray_buffer(device, most)?, ray_buffer(device, most)?]) } else { None },
         kept: Default::default(),
         launched: [0; 2],
     };
-    let params = estimator.rays.params(BlockParams {
-        orthographic: camera.orthographic.into(),
-        hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
-        falloff_log2: options.attenuation().falloff_log2() as f32,
-        radius: options.attenuation().reach() as f32,
-        ..Default::default()
-    });
-    estimator.has_entry_points = estimator.rays.has_entry_points(&params);
-    let image = accumulate(tracer, camera, samples, &params, &mut estimator, control)?;
+    let image = accumulate(tracer, camera, samples, &mut estimator, control)?;
     let has_entry_points = estimator.has_entry_points;
     let [kept_primary, kept_occlusion] = estimator.kept;
     let [launched_samples, launched_camera_rays] = estimator.launched;
@@ -292,11 +270,14 @@ impl Estimator for AoEstimator {
         self.dumps.is_some()
     }
 
-    fn begin(&mut self, mut params: BlockParams, keep: bool) -> Result<u64> {
+    fn begin(&mut self, block: &BlockParams, film: u64, keep: bool) -> Result<u64> {
+        let mut own = self.own;
         if let Some(dumps) = self.dumps.as_ref().filter(|_| keep) {
-            [params.ray_dump, params.occlusion_dump] = [dumps[0].address(), dumps[1].address()];
+            [own.ray_dump, own.occlusion_dump] = [dumps[0].address(), dumps[1].address()];
         }
-        self.params.write(0, bytemuck::bytes_of(&params))?;
+        self.params.write(block, &own)?;
+        let film = FilmParams { film, samples: self.own.samples, ..Default::default() };
+        self.film.write(0, bytemuck::bytes_of(&film))?;
         Ok(self.params.address())
     }
 
@@ -308,7 +289,8 @@ impl Estimator for AoEstimator {
                 self.rays.record(r, push, self.has_entry_points);
                 r.barrier();
                 let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
-                r.timed("resolve", |r| r.dispatch(&self.resolve, push, groups));
+                let resolved = Push { pass: self.film.address(), ..*push };
+                r.timed("resolve", |r| r.dispatch(&self.resolve, &resolved, groups));
                 // the next launch reuses the queue and the samples
                 r.barrier();
             }

@@ -1,9 +1,10 @@
 //! The rays of samples of ambient occlusion: camera rays, and occlusion rays from their hits.
 
-use super::{Attenuation, NO_HIT};
+use super::{NO_HIT, Occlusion};
 use crate::error::Result;
+use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Memory, Recorder};
-use crate::interface::records::block::BlockParams;
+use crate::interface::records::ao::{AoParams, OcclusionRecord};
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::entry_points::EntryPoints;
 use crate::tracer::queue::RayQueue;
@@ -20,9 +21,9 @@ pub struct AoRays {
 }
 
 /// The streams that samples need: without a falloff any hit ends an occlusion ray.
-pub fn streams(attenuation: Attenuation) -> [&'static StreamShaders; 2] {
-    let occlusion = if attenuation.is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST };
-    [&shaders::PRIMARY_CLOSEST, occlusion]
+pub fn streams(occlusion: Occlusion) -> [&'static StreamShaders; 2] {
+    let traced = if occlusion.is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST };
+    [&shaders::PRIMARY_CLOSEST, traced]
 }
 
 impl AoRays {
@@ -31,15 +32,9 @@ impl AoRays {
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(
-        tracer: &Tracer,
-        attenuation: Attenuation,
-        most: u32,
-        sample_bits: u32,
-        camera_shift: u32,
-    ) -> Result<Self> {
+    pub fn new(tracer: &Tracer, occlusion: Occlusion, most: u32, sample_bits: u32, camera_shift: u32) -> Result<Self> {
         let device = tracer.device();
-        let [primary, occlusion] = streams(attenuation);
+        let [primary, occlusion] = streams(occlusion);
         let primary = tracer.stream(primary)?;
         Ok(Self {
             entry_points: EntryPoints::new(tracer, &primary, most, sample_bits.saturating_sub(camera_shift))?,
@@ -56,23 +51,24 @@ impl AoRays {
         self.samples.address()
     }
 
-    /// Returns true if camera rays start below the root of the hierarchy, in launches of enough
-    /// samples: `params` are of [`AoRays::params`].
-    pub fn has_entry_points(&self, params: &BlockParams) -> bool {
-        self.entry_points.is_some() && params.orthographic == 0
+    /// Returns true if rays of the camera start below the root of the hierarchy, in launches of
+    /// enough samples.
+    pub fn has_entry_points(&self, camera: &CameraRecord) -> bool {
+        self.entry_points.is_some() && !camera.orthographic
     }
 
-    /// `params` with the addresses that the streams read.
-    pub fn params(&self, params: BlockParams) -> BlockParams {
-        BlockParams {
+    /// The parameters of the streams.
+    pub fn params(&self, occlusion: OcclusionRecord, camera: &CameraRecord) -> AoParams {
+        AoParams {
+            occlusion,
             samples: self.samples.address(),
             queue: self.queue.record(),
             camera_shift: self.camera_shift,
             entry_points: match &self.entry_points {
-                Some(lists) if self.has_entry_points(&params) => lists.address(),
+                Some(lists) if self.has_entry_points(camera) => lists.address(),
                 _ => 0,
             },
-            ..params
+            ..Default::default()
         }
     }
 

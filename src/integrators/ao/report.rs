@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{AoOptions, AoResult};
 use crate::film::covered_mean;
 use crate::integrators::IntegratorReport;
-use crate::interface::records::block::MAX_ENTRY_POINTS;
+use crate::interface::records::ao::MAX_ENTRY_POINTS;
 
 /// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
@@ -16,11 +16,11 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
     let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
     let record = json!({
         "ao": {
-            "radius": finite(options.radius),
-            "falloff": options.falloff,
-            "normal": options.hemisphere,
+            "radius": finite(options.occlusion.radius),
+            "falloff": options.occlusion.falloff,
+            "normal": options.occlusion.hemisphere,
             "rays": options.rays,
-            "reach": finite(options.attenuation().reach()),
+            "reach": finite(options.occlusion.reach()),
         },
         "covered_mean": covered_mean,
         "rays": {
@@ -33,14 +33,14 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
     });
 
     // Explanations of skipped work.
-    let is_binary = options.attenuation().is_binary();
+    let is_binary = options.occlusion.is_binary();
     let occlusion = if is_binary {
         "binary occlusion: any-hit rays"
     } else {
         "occlusion falls off with distance: closest-hit rays"
     };
     let mut explanations = vec![occlusion.to_owned()];
-    explanations.push(match options.attenuation().reach() {
+    explanations.push(match options.occlusion.reach() {
         r if r.is_finite() => {
             // four digits, however small the scene is
             let reach: f64 = format!("{r:.3e}").parse().unwrap_or(r);

@@ -1,6 +1,6 @@
 //! Settings of ambient occlusion, for stills and real-time frames.
 
-use super::Hemisphere;
+use super::{Hemisphere, Occlusion};
 #[cfg(feature = "cli")]
 use crate::settings::parse::parse_falloff;
 use crate::settings::{AppliesTo, Capability, Length, settings};
@@ -48,8 +48,17 @@ impl AoSettings {
         }
     }
 
-    /// Axis of the hemisphere.
-    pub fn hemisphere(&self) -> Hemisphere {
-        self.ao_normal.unwrap_or_default()
+    /// Which hits occlude, binary where the falloff is left open.
+    pub fn occlusion(&self) -> Occlusion {
+        self.occlusion_with(1.0)
+    }
+
+    /// As [`AoSettings::occlusion`], with the falloff where it is left open.
+    pub fn occlusion_with(&self, falloff: f64) -> Occlusion {
+        Occlusion {
+            radius: self.radius(),
+            falloff: self.ao_falloff.unwrap_or(falloff),
+            hemisphere: self.ao_normal.unwrap_or_default(),
+        }
     }
 }

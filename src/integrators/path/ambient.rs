@@ -17,7 +17,7 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
 use crate::gpu::{Commands, Timing};
-use crate::integrators::ao::Attenuation;
+use crate::integrators::ao::Occlusion;
 use crate::shaders;
 use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
@@ -53,9 +53,9 @@ pub fn trace(
     control: &mut dyn Control,
     take: &mut TakeSamples,
 ) -> Result<()> {
-    let unlimited = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
-    let hemisphere = options.ambient.map(|a| a.hemisphere).unwrap_or_default();
-    let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere, occluded: OccludedLight::Ambient };
+    let hemisphere = options.ambient.map(|a| a.occlusion.hemisphere).unwrap_or_default();
+    let unlimited = Occlusion { hemisphere, ..Default::default() };
+    let ambient = Ambient { color: Vec3::ONE, occlusion: unlimited, occluded: OccludedLight::Ambient };
     // every sample of every tile, in one go
     let SampleSettings { size, spp, seed, pixel_filter, .. } = options.samples;
     let samples = SampleSettings { size, spp, seed, pixel_filter, ..Default::default() };
@@ -74,7 +74,7 @@ pub fn trace(
     paths.find_camera_media(camera)?;
     let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
     let mut estimator = DistanceEstimator { paths, distance, block: None, width: size[0], take };
-    accumulate(tracer, camera, &options.samples, &ambient.block_params(), &mut estimator, control).map(drop)
+    accumulate(tracer, camera, &options.samples, &mut estimator, control).map(drop)
 }
 
 struct DistanceEstimator<'a, 't> {
@@ -89,9 +89,9 @@ struct DistanceEstimator<'a, 't> {
 impl Estimator for DistanceEstimator<'_, '_> {
     const CHANNELS: usize = 3;
 
-    fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64> {
-        self.block = Some(Block { origin: params.block_origin, size: params.block_size });
-        self.paths.begin(params, keep)
+    fn begin(&mut self, block: &BlockParams, film: u64, keep: bool) -> Result<u64> {
+        self.block = Some(Block { origin: block.block_origin, size: block.block_size });
+        self.paths.begin(block, film, keep)
     }
 
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], _: bool) -> Result<Vec<Timing>> {
@@ -118,7 +118,7 @@ impl PathEstimator {
     fn launch_distances(&self, commands: &mut Commands, push: Push, distance: &Stream) -> Result<Vec<Timing>> {
         let of_ambient = |rays: &&FirstSurfaceRays| rays.count == AMBIENT_COUNT;
         let Some(ambient) = self.of_first_surface.iter().find(of_ambient) else { return Ok(Vec::new()) };
-        let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.block_params[k].address(), ..push });
+        let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.params[k].address(), ..push });
         commands.run(|r| {
             self.buffers.queues[0].clear(r);
             self.clear_light_queues(r);

@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use crate::film::block::BlockParams;
 use crate::integrators::IntegratorSettings;
-use crate::integrators::ao::{Attenuation, Hemisphere};
+use crate::integrators::ao::Occlusion;
 use crate::settings::choices;
 
 choices! {
@@ -32,10 +31,8 @@ choices! {
 pub struct Ambient {
     /// Radiance, linear RGB.
     pub color: Vec3,
-    /// Radius and falloff of ambient occlusion.
-    pub attenuation: Attenuation,
-    /// Axis of the hemisphere of occlusion rays.
-    pub hemisphere: Hemisphere,
+    /// Which hits keep it from a surface.
+    pub occlusion: Occlusion,
     /// The light that ambient occlusion darkens.
     pub occluded: OccludedLight,
 }
@@ -43,31 +40,19 @@ pub struct Ambient {
 impl Ambient {
     /// The ambient light that settings describe.
     pub(super) fn new(settings: &IntegratorSettings) -> Self {
-        let ao = &settings.ao;
         Self {
             color: settings.path.ambient.map_or(Vec3::ONE, |c| c.as_vec3()),
-            attenuation: Attenuation { radius: ao.radius(), falloff: ao.ao_falloff.unwrap_or(1.0) },
-            hemisphere: ao.hemisphere(),
+            occlusion: settings.ao.occlusion(),
             occluded: settings.path.occluded_light.unwrap_or_default(),
-        }
-    }
-
-    /// The parameters of occlusion rays.
-    pub(super) fn block_params(&self) -> BlockParams {
-        BlockParams {
-            hemisphere: (self.hemisphere == Hemisphere::Shading) as u32,
-            falloff_log2: self.attenuation.falloff_log2() as f32,
-            radius: self.attenuation.reach() as f32,
-            ..Default::default()
         }
     }
 }
 
 impl std::fmt::Display for Ambient {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let Attenuation { radius, falloff } = self.attenuation;
+        let Occlusion { radius, falloff, hemisphere } = self.occlusion;
         let [r, g, b] = self.color.to_array();
-        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {} normal", self.hemisphere)?;
+        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {hemisphere} normal")?;
         match self.occluded {
             OccludedLight::Ambient => Ok(()),
             OccludedLight::All => f.write_str(", of all light"),
@@ -77,13 +62,13 @@ impl std::fmt::Display for Ambient {
 
 impl serde::Serialize for Ambient {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let Attenuation { radius, falloff } = self.attenuation;
+        let Occlusion { radius, falloff, hemisphere } = self.occlusion;
         serde_json::json!({
             "color": self.color.to_array(),
             "radius": radius.is_finite().then_some(radius),
             "falloff": falloff,
             "occluded_light": self.occluded,
-            "normal": self.hemisphere,
+            "normal": hemisphere,
         })
         .serialize(serializer)
     }

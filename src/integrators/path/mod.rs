@@ -29,10 +29,11 @@ use glam::DMat3;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, accumulate, max_rays};
-use crate::film::block::BlockParams;
+use crate::film::block::{BlockParams, PassParams};
 use crate::film::camera::CameraRecord;
 use crate::film::{Control, SampleSettings};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Specialization, Timing};
+use crate::interface::records::film::FilmParams;
 use crate::interface::{LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::Scene;
@@ -46,7 +47,7 @@ use light_sources::LightSources;
 use lights::LightBuilder;
 use lights::device::DeviceLights;
 use media::ClosedVolumes;
-use params::{PathParams, QUAD_BYTES};
+use params::{LaunchParams, PathFrameParams, PathParams, QUAD_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Minimum number of bounces per submission, after which the host reads how many paths are left.
@@ -56,8 +57,6 @@ const MAX_BOUNCES: u32 = 32;
 /// Launches beyond those of the bounces, for surfaces that paths pass straight through and for
 /// scatterings in volumes. A path counts them in 16 bits (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
-/// Where the parameters of paths lie behind those of their block, bytes.
-const PARAMS_BYTES: u64 = size_of::<BlockParams>() as u64;
 
 /// An image and statistics of its rays.
 #[derive(Clone, Debug, Default)]
@@ -170,8 +169,7 @@ impl PathIntegrator {
         }
         let samples = SampleSettings { spp, seed, ..options.samples.clone() };
         paths.traced = PathCounts::default();
-        let params = options.ambient.map(|a| a.block_params()).unwrap_or_default();
-        let image = accumulate(tracer, camera, &samples, &params, paths, control)?;
+        let image = accumulate(tracer, camera, &samples, paths, control)?;
         let PathCounts { bounce_rays, shadow_rays, ambient_rays, longest_path } = paths.traced;
         Ok(PathResult {
             image,
@@ -217,13 +215,15 @@ struct PathPipelines {
 
 struct PathEstimator {
     pipelines: PathPipelines,
-    /// The launches that follow begin at known hits ([`BlockParams::known_hits`]).
+    /// The launches that follow begin at known hits ([`PathFrameParams::known_hits`]).
     begins_at_known: bool,
     buffers: PathBuffers,
     /// Parameters for filling either queue of bounces; then those for tracing either queue of
-    /// shadow rays behind walls: those of the block, and behind them those of paths.
-    block_params: Vec<Buffer>,
-    records: Vec<PathParams>,
+    /// shadow rays behind walls; then those of rays of first surfaces.
+    params: Vec<PassParams<LaunchParams>>,
+    records: Vec<LaunchParams>,
+    /// Parameters of `path_resolve`.
+    film: Buffer,
     walls: Option<TransmittedShadowRays>,
     /// Rays of first surfaces, each kind on its own.
     of_first_surface: Vec<FirstSurfaceRays>,
@@ -290,13 +290,12 @@ fn check_tracer(tracer: &Tracer, options: &PathOptions) -> Result<bool> {
     Ok(cones)
 }
 
-/// Uploads the parameters of launches, each behind room for those of a block.
-fn upload_params(device: &Arc<Device>, records: &[PathParams]) -> Result<Vec<Buffer>> {
-    let size = PARAMS_BYTES + size_of::<PathParams>() as u64;
+/// Uploads the parameters of launches; those of their block are yet to be written.
+fn upload_params(device: &Arc<Device>, records: &[LaunchParams]) -> Result<Vec<PassParams<LaunchParams>>> {
     let upload = |record| {
-        let mut buffer = Buffer::new(device, "block parameters", size, Memory::Upload)?;
-        buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
-        Ok(buffer)
+        let mut params = PassParams::new(device, "parameters of paths")?;
+        params.write_own(record)?;
+        Ok(params)
     };
     records.iter().map(upload).collect()
 }
@@ -328,7 +327,8 @@ impl PathEstimator {
         let walls = transmits.then(|| TransmittedShadowRays::new(tracer, &constants, most)).transpose()?;
         let behind_walls = walls.as_ref().map(|w| (w.later.record(), w.contributions.address()));
         let (records, of_first_surface) = buffers.launch_params(behind_walls, base);
-        let block_params = upload_params(device, &records)?;
+        let launch = |path| LaunchParams { path, of_frame: PathFrameParams::default() };
+        let records: Vec<_> = records.into_iter().map(launch).collect();
 
         // Pipelines.
         let shares_camera_rays = !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens);
@@ -338,8 +338,9 @@ impl PathEstimator {
             pipelines,
             begins_at_known: false,
             buffers,
-            block_params,
+            params: upload_params(device, &records)?,
             records,
+            film: Buffer::new(device, "parameters of the film", size_of::<FilmParams>() as u64, Memory::Upload)?,
             walls,
             of_first_surface,
             volumes: features.contains(PathFeature::Media).then(|| ClosedVolumes::new(flat)),
@@ -362,30 +363,26 @@ impl PathEstimator {
         let near = camera.clip[0];
         let start = camera.camera_to_world.map(|row| f64::from(row[3] - near * row[2]));
         let camera_media = volumes.containing(glam::DVec3::from_array(start));
-        self.change_records(|record| record.camera_media = camera_media)
+        self.change_records(|record| record.path.camera_media = camera_media)
     }
 
     /// From now on Russian roulette may end paths after so many bounces.
     fn begin_roulette_after(&mut self, bounces: u32) -> Result<()> {
-        if self.records[0].options.rr_depth == bounces {
+        if self.records[0].path.options.rr_depth == bounces {
             return Ok(());
         }
-        self.change_records(|record| record.options.rr_depth = bounces)
+        self.change_records(|record| record.path.options.rr_depth = bounces)
     }
 
     /// Writes the parameters of a block.
-    fn write_block(&mut self, params: &BlockParams) -> Result<()> {
-        for buffer in &mut self.block_params {
-            let path = buffer.address() + PARAMS_BYTES;
-            buffer.write(0, bytemuck::bytes_of(&BlockParams { path, ..*params }))?;
-        }
-        Ok(())
+    fn write_block(&mut self, block: &BlockParams) -> Result<()> {
+        self.params.iter_mut().try_for_each(|params| params.write_block(block))
     }
 
     /// Turns the environment map.
     fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         let rows = environment::rows(to_map);
-        self.change_records(|record| record.map.to_map = rows)
+        self.change_records(|record| record.path.map.to_map = rows)
     }
 
     /// Number of lights that light sampling chooses from.
@@ -405,15 +402,15 @@ impl PathEstimator {
         }
         self.lights.check_fits(&lights, self.features, self.light_kinds)?;
         let lights = DeviceLights::new(device, lights)?;
-        self.change_records(|record| *record = lights.params(*record))?;
+        self.change_records(|record| record.path = lights.params(record.path))?;
         self.lights = lights;
         Ok(true)
     }
 
-    fn change_records(&mut self, change: impl Fn(&mut PathParams)) -> Result<()> {
-        for (record, buffer) in self.records.iter_mut().zip(&mut self.block_params) {
+    fn change_records(&mut self, change: impl Fn(&mut LaunchParams)) -> Result<()> {
+        for (record, params) in self.records.iter_mut().zip(&mut self.params) {
             change(record);
-            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
+            params.write_own(record)?;
         }
         Ok(())
     }
@@ -429,7 +426,7 @@ impl PathEstimator {
             Some(walls) => {
                 walls.later.clear(r);
                 r.barrier();
-                let push = Push { pass: self.block_params[2].address(), ..push };
+                let push = Push { pass: self.params[2].address(), ..push };
                 walls.stream.record(r, &self.buffers.shadow_queue.push(push, most));
                 r.barrier();
                 r.copy(walls.later.count(), 0, &walls.count, 0, 4);
@@ -443,7 +440,7 @@ impl PathEstimator {
     fn record_first_surface(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         for FirstSurfaceRays { queue, params, count } in &self.of_first_surface {
             r.barrier();
-            let push = Push { pass: self.block_params[*params].address(), ..push };
+            let push = Push { pass: self.params[*params].address(), ..push };
             self.pipelines.shadow.record(r, &queue.push(push, most));
             r.barrier();
             r.copy(queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + count), 4);
@@ -469,7 +466,7 @@ impl PathEstimator {
                 return Ok(timings);
             }
             self.traced.shadow_rays += u64::from(left);
-            let push = Push { pass: self.block_params[2 + from].address(), ..push };
+            let push = Push { pass: self.params[2 + from].address(), ..push };
             timings.extend(commands.run(|r| {
                 queues[from ^ 1].clear(r);
                 r.barrier();
@@ -483,7 +480,7 @@ impl PathEstimator {
 
     /// Traces all bounces of a launch, and adds the paths to the film.
     fn trace_to_film(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
-        let resolved = Push { pass: self.block_params[0].address(), ..push };
+        let resolved = Push { pass: self.film.address(), ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
         self.trace(commands, push, |paths, r| {
             r.timed("path_resolve", |r| r.dispatch(&paths.pipelines.resolve, &resolved, groups))
@@ -498,7 +495,7 @@ impl PathEstimator {
         push: Push,
         finish: impl Fn(&Self, &mut Recorder),
     ) -> Result<Vec<Timing>> {
-        let passes = [0, 1].map(|k| self.block_params[k].address());
+        let passes = [0, 1].map(|k| self.params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // a surface that a path passes straight through is no bounce, but needs a launch
         let straight = self.volumes.is_some() || self.features.contains(PathFeature::ClearWalls);
@@ -594,9 +591,12 @@ fn bounces_of_submission(all: u32, left: u32, before: u32) -> u32 {
 impl Estimator for PathEstimator {
     const CHANNELS: usize = 3;
 
-    fn begin(&mut self, params: BlockParams, _: bool) -> Result<u64> {
-        self.write_block(&params)?;
-        Ok(self.block_params[0].address())
+    fn begin(&mut self, block: &BlockParams, film: u64, _: bool) -> Result<u64> {
+        self.write_block(block)?;
+        let PathParams { radiance, occludes_all, .. } = self.records[0].path;
+        let film = FilmParams { film, samples: radiance, occludes_all, ..Default::default() };
+        self.film.write(0, bytemuck::bytes_of(&film))?;
+        Ok(self.params[0].address())
     }
 
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], _: bool) -> Result<Vec<Timing>> {

@@ -1,8 +1,17 @@
 //! Parameters of the path tracer's shaders, [`PathParams`], and sizes of the state of each path.
 
 use crate::interface::records::path::PathRecord;
-pub(super) use crate::interface::records::path::{EnvironmentRecord, PathParams};
+pub(super) use crate::interface::records::path::{EnvironmentRecord, PathFrameParams, PathParams};
 pub(super) use crate::interface::records::ray::INVALID;
+
+/// The parameters of a launch, behind those of its block.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct LaunchParams {
+    pub path: PathParams,
+    /// What frames in real time add; zero in stills.
+    pub of_frame: PathFrameParams,
+}
 
 /// Bytes of the state of a path between two bounces.
 pub(super) const STATE_BYTES: u64 = size_of::<PathRecord>() as u64;

@@ -386,6 +386,7 @@ impl PathOptions {
             albedo: self.white_sky.unwrap_or(0.0),
             ambient_color: self.ambient.map_or([0.0; 3], |a| a.color.to_array()),
             occludes_all: self.occludes_all().into(),
+            occlusion: self.ambient.map(|a| a.occlusion.record()).unwrap_or_default(),
             lens_radius: self.lens.map_or(0.0, |l| l.radius),
             focus: self.lens.map_or(1.0, |l| l.focus),
             ..Default::default()

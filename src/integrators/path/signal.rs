@@ -6,9 +6,10 @@ use glam::DMat3;
 use super::{PathEstimator, PathOptions};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
-use crate::film::block::BlockParams;
+use crate::film::block::{BlockParams, PassParams};
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
+use crate::interface::records::path::PathFrameParams;
 use crate::interface::records::radiance::{GuideRayRecord, MAX_GUIDE_BOUNCES, SurfacesParams};
 use crate::scene::material::MaterialKind;
 use crate::scene::{Material, Scene};
@@ -21,19 +22,14 @@ pub struct SignalPaths {
     paths: PathEstimator,
     gather: ComputePipeline,
     capacity: u32,
-    /// Parameters of ambient light; all other fields are 0.
-    ambient: BlockParams,
     rr_depth: u32,
-    /// Parameters of the frame's block.
-    block: BlockParams,
 }
 
 /// Finds the surface behind each pixel that scatters light, seen directly or by mirrors and glass.
 pub struct GuideRays {
     camera: Stream,
     behind: Option<RaysBehind>,
-    params: [Buffer; 2],
-    blocks: [Buffer; 2],
+    params: [PassParams<SurfacesParams>; 2],
 }
 
 /// Rays behind mirrors and glass, in two queues: one is traced while the other is filled.
@@ -55,8 +51,6 @@ impl SignalPaths {
             gather: shaders::PATH_GATHER.pipeline(tracer.device())?,
             capacity,
             rr_depth: options.rr_depth,
-            block: BlockParams::default(),
-            ambient: options.ambient.map(|a| a.block_params()).unwrap_or_default(),
         })
     }
 
@@ -73,8 +67,7 @@ impl SignalPaths {
         let device = tracer.device();
         let PathEstimator { features, light_kinds, .. } = &self.paths;
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
-        let params = |name, bytes: usize| Buffer::new(device, name, bytes as u64, Memory::Upload);
-        let two = |name, bytes| Ok::<_, Error>([params(name, bytes)?, params(name, bytes)?]);
+        let params = || PassParams::new(device, "parameters of surfaces");
         let behind = || {
             let bytes = size_of::<GuideRayRecord>() as u64 * u64::from(pixels);
             let states = || Buffer::new(device, "rays of the G-buffer", bytes, Memory::Device);
@@ -89,14 +82,13 @@ impl SignalPaths {
         Ok(GuideRays {
             camera: tracer.specialized(&shaders::PATH_SURFACE_CLOSEST, &constants)?,
             behind,
-            params: two("parameters of surfaces", size_of::<SurfacesParams>())?,
-            blocks: two("block of surfaces", size_of::<BlockParams>())?,
+            params: [params()?, params()?],
         })
     }
 
     /// Device address of the parameters of paths, for other shaders.
     pub fn params_address(&self) -> u64 {
-        self.paths.block_params[0].address() + super::PARAMS_BYTES
+        self.paths.params[0].own_address()
     }
 
     /// Turns the environment map: `to_map` is the rotation from world directions to the map's.
@@ -116,36 +108,39 @@ impl SignalPaths {
         self.paths.move_lights(tracer.device(), scene)
     }
 
-    /// Returns true if paths can begin at [`BlockParams::known_hits`], as they share camera rays.
+    /// Returns true if paths can begin at [`PathFrameParams::known_hits`], as they share camera rays.
     pub fn can_begin_at_known(&self) -> bool {
         self.paths.pipelines.known.is_some()
     }
 
-    /// Begins a frame: the camera and its block, with [`BlockParams::frame`],
-    /// [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE`
-    /// for samples that all lie there. Russian roulette begins after `rr_depth` bounces, or later
-    /// by the options.
+    /// Begins a frame: the camera and its block, with [`BlockParams::centre_offset`] and
+    /// [`BlockParams::pixel_filter`], which is `FILTER_CENTRE` for samples that all lie there.
+    /// Russian roulette begins after `rr_depth` bounces, or later by the options.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn begin(&mut self, camera: &CameraRecord, params: &BlockParams, rr_depth: u32) -> Result<()> {
+    pub fn begin(
+        &mut self,
+        camera: &CameraRecord,
+        block: &BlockParams,
+        of_frame: PathFrameParams,
+        rr_depth: u32,
+    ) -> Result<()> {
         self.paths.begin_roulette_after(rr_depth.max(self.rr_depth))?;
         self.paths.find_camera_media(camera)?;
         self.paths.traced = super::PathCounts::default();
-        self.paths.begins_at_known = params.known_hits != 0;
-        let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;
-        self.block = BlockParams { hemisphere, falloff_log2, radius, ..*params };
-        self.paths.write_block(&self.block)
+        self.paths.begins_at_known = of_frame.known_hits != 0;
+        self.paths.write_block(block)?;
+        self.paths.change_records(|record| record.of_frame = of_frame)
     }
 
     /// Has later launches take `1 << bits` more pixels of each listed one
-    /// ([`BlockParams::listed`]).
+    /// ([`PathFrameParams::listed`]).
     ///
     /// # Errors
     /// Those of the device.
     pub fn list(&mut self, bits: u32) -> Result<()> {
-        self.block.listed_bits = bits;
-        self.paths.write_block(&self.block)
+        self.paths.change_records(|record| record.of_frame.listed_bits = bits)
     }
 
     /// Traces the paths of a launch; then `path_gather` adds them to the images of the frame, with
@@ -175,35 +170,32 @@ impl SignalPaths {
 }
 
 impl GuideRays {
-    /// Writes the parameters of a frame. `params` are those of the block, with
-    /// [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`]; `outputs`
-    /// are written for each pixel, and its other fields are 0.
+    /// Writes the parameters of a frame: those of the block, with [`BlockParams::centre_offset`],
+    /// and those of the pass, in which the fields about rays that go on are 0.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn prepare(&mut self, params: &BlockParams, outputs: &SurfacesParams) -> Result<()> {
+    pub fn prepare(&mut self, block: &BlockParams, own: &SurfacesParams) -> Result<()> {
         for k in 0..2 {
             // parameters k fill queue k, and read the states of the other
             let surfaces = match &self.behind {
-                None => *outputs,
+                None => *own,
                 Some(behind) => SurfacesParams {
                     next: behind.queues[k].record(),
                     states: behind.states[k ^ 1].address(),
                     next_states: behind.states[k].address(),
                     tags: behind.queues[k ^ 1].record().tags,
-                    ..*outputs
+                    ..*own
                 },
             };
-            self.params[k].write(0, bytemuck::bytes_of(&surfaces))?;
-            let block = BlockParams { surfaces: self.params[k].address(), ..*params };
-            self.blocks[k].write(0, bytemuck::bytes_of(&block))?;
+            self.params[k].write(block, &surfaces)?;
         }
         Ok(())
     }
 
     /// Records the rays of a launch of pixels.
     pub fn record(&self, r: &mut Recorder, push: &Push) {
-        let push = |fills: usize| Push { pass: self.blocks[fills].address(), ..*push };
+        let push = |fills: usize| Push { pass: self.params[fills].address(), ..*push };
         let Some(behind) = &self.behind else {
             self.camera.record(r, &push(0));
             return;

@@ -3,6 +3,12 @@
 records! {
     "aov";
 
+    /// Parameters of `aov`, behind the `BlockParams`.
+    AovParams: Block(access: "readonly", align: 8) {
+        /// Output, an `AovPixel` for each ray of a launch.
+        pixels: address,
+    }
+
     /// Surface properties at the hit of the ray through a pixel's centre.
     AovPixel: Words {
         /// Distance along the ray, scene units; infinite for a miss.

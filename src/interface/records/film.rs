@@ -1,7 +1,21 @@
-//! Pixels of the film on the device: compensated sums (Kahan 1965), each a sum and its excess.
+//! The film on the device: compensated sums (Kahan 1965) for each pixel, each a sum and its excess,
+//! and the parameters of the passes that add samples to it.
 
 records! {
     "film";
+
+    /// Parameters of the passes that add the samples of a launch to the film. They have all that
+    /// those read: a CPU driver reads once for all lanes what push constants lead to at once.
+    FilmParams: Block(access: "readonly", align: 8) {
+        /// The film's pixels, in the order of the block.
+        film: address,
+        /// A float per sample for ambient occlusion, a `vec4` (`PathParams.radiance`) for paths.
+        samples: address,
+        /// `PathParams.occludes_all`.
+        occludes_all: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
 
     /// A pixel of a film of one channel.
     ScalarFilmPixel: Array(buffer: "ScalarFilm", access: "", align: 8) {

@@ -1,12 +1,14 @@
 //! Records in device memory, push constants and shared numbers, one file per subject.
 
 pub mod albedo;
+pub mod ao;
 pub mod aov;
 pub mod block;
 pub mod denoise;
 pub mod display;
 pub mod film;
 pub mod frame;
+pub mod gbuffer;
 pub mod hierarchy;
 pub mod larsen;
 pub mod lights;
@@ -24,17 +26,19 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 21] = [
+pub const FILES: [&File; 23] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
     &shading::FILE,
     &block::FILE,
+    &ao::FILE,
     &film::FILE,
     &super::path_options::FILE,
     &lights::FILE,
     &path::FILE,
     &frame::FILE,
+    &gbuffer::FILE,
     &passes::FILE,
     &radiance::FILE,
     &larsen::FILE,

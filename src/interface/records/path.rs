@@ -1,11 +1,12 @@
 //! Parameters of the path tracer's passes, and the state of each path.
 
 use super::super::path_options::PathOptionsRecord;
+use super::ao::OcclusionRecord;
 use super::lights::LightRecord;
 use super::queue::QueueRecord;
 
 records! {
-    "path" includes "queue" "path_options" "lights" values {
+    "path" includes "queue" "ao" "path_options" "lights" values {
         /// Phase of a path that has met mirrors and glass alone, and followed the G-buffer's rays.
         SIGNAL_SEEN: float = 0.0;
         /// Phase of a path: as before, but it went another way.
@@ -131,8 +132,25 @@ records! {
         distant_irradiance: float,
         /// Probability with which the environment is chosen among distant lights.
         environment_probability: float,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// Which hits keep ambient light from a surface, with `WITH_AMBIENT`.
+        occlusion: OcclusionRecord,
+    }
+
+    /// Parameters of the paths of a frame in real time, with `WITH_SIGNAL`. They lie behind the
+    /// `PathParams`.
+    PathFrameParams: Block(access: "readonly", align: 8) {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// A `KnownHit` per pixel of the image (`path_surface`), or 0: paths trace their camera
+        /// rays themselves.
+        known_hits: address,
+        /// Listed ones among the pixels that are sampled in the frame (`SurfacesParams.list`).
+        listed: address,
+        /// Number of pixels that are sampled in the frame. Rays of pixels beyond are of listed
+        /// ones, `1 << listed_bits` after another of each.
+        cells: uint,
+        /// Log2 of the number of pixels beyond `cells` that are of a listed one.
+        listed_bits: uint,
     }
 
     /// The signal of a path of a frame, beside its radiance, without directly visible emission. Its

@@ -32,8 +32,12 @@ records! {
         reserved: uint,
     }
 
-    /// Parameters of `path_surface` and `path_reflection`, beside those of the block.
+    /// Parameters of `path_surface` and `path_reflection`, behind the `BlockParams`.
     SurfacesParams: Block(access: "readonly", align: 8) {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Address of the `PathParams`.
+        path: address,
         /// The queue of rays behind mirrors and glass.
         next: QueueRecord,
         /// A `GuideRayRecord` per ray of the queue that is traced; 0: no ray goes on.

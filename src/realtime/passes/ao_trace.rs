@@ -21,7 +21,7 @@ pub struct AoTrace {
 
 /// The stream that it traces: without a falloff any hit ends a ray.
 pub fn stream(settings: &Settings) -> &'static StreamShaders {
-    if settings.attenuation().is_binary() { &shaders::AO_TRACE_ANY } else { &shaders::AO_TRACE_CLOSEST }
+    if settings.occlusion.is_binary() { &shaders::AO_TRACE_ANY } else { &shaders::AO_TRACE_CLOSEST }
 }
 
 /// Parameters of the rays of a frame, shared by `ao_trace` and `gather`.

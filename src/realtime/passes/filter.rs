@@ -73,7 +73,7 @@ impl Pass for Filter {
             bent_from,
             bent_to,
             samples: s.filter.samples,
-            evenness: if s.attenuation().is_binary() { 0.0 } else { s.sequence.evenness() },
+            evenness: if s.occlusion.is_binary() { 0.0 } else { s.sequence.evenness() },
             ..self.step.params()
         })
     }

@@ -1,12 +1,12 @@
 //! `gbuffer`: the surface at each pixel's centre, by camera rays; skipped if nothing moves.
 
 use crate::error::Result;
-use crate::film::block::{Block, BlockParams};
+use crate::film::block::{Block, BlockParams, PassParams};
 use crate::gpu::Recorder;
-use crate::integrators::ao::Hemisphere;
+use crate::interface::records::gbuffer::GbufferParams;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
+use crate::realtime::graph::{Frame, Pass, Range, Stage};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::{self, StreamShaders};
@@ -17,7 +17,7 @@ pub const STREAM: &StreamShaders = &shaders::GBUFFER_CLOSEST;
 
 struct Gbuffer {
     rays: CameraRays,
-    params: Params<BlockParams>,
+    params: PassParams<GbufferParams>,
     has_axes: bool,
     is_dynamic: bool,
 }
@@ -26,8 +26,8 @@ struct Gbuffer {
 pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primary) -> Result<Stage> {
     let pass = Gbuffer {
         rays: CameraRays::new(tracer, STREAM, primary, block.size)?,
-        params: Params::new(tracer.device(), "G-buffer parameters")?,
-        has_axes: settings.hemisphere == Hemisphere::Shading,
+        params: PassParams::new(tracer.device(), "G-buffer parameters")?,
+        has_axes: settings.occlusion.is_about_shading_normals(),
         is_dynamic: tracer.is_dynamic(),
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1, settings.launch_rays)))
@@ -42,12 +42,12 @@ impl Pass for Gbuffer {
     }
 
     fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
-        self.params.write(&BlockParams {
-            hemisphere: self.has_axes.into(),
-            frame: frame.params,
+        let block = BlockParams {
             centre_offset: frame.plan.offset,
             ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
-        })
+        };
+        let own = GbufferParams { frame: frame.params, hemisphere: self.has_axes.into(), ..Default::default() };
+        self.params.write(&block, &own)
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
@@ -60,7 +60,7 @@ impl Pass for Gbuffer {
             };
             self.rays.draw(r, frame.tracer, &view)?;
         }
-        self.rays.record(r, &self.params.push(frame, range));
+        self.rays.record(r, &frame.push(self.params.address(), range));
         Ok(())
     }
 }

@@ -10,6 +10,7 @@ use crate::film::block::{Block, BlockParams, TILE_PIXELS};
 use crate::gpu::{Commands, Recorder, Timing};
 use crate::integrators::path::signal::SignalPaths;
 use crate::interface::PixelFilter;
+use crate::interface::records::path::PathFrameParams;
 use crate::interface::records::radiance::GatherParams;
 use crate::realtime::Settings;
 use crate::realtime::display::Display;
@@ -81,15 +82,17 @@ impl Pass for Paths {
         let pixel_filter = if frame.plan.placement.spreads { PixelFilter::Box } else { PixelFilter::Centre };
         // paths that lie where the G-buffer's rays do begin at what those hit
         let begins_at_known = !frame.plan.placement.spreads && self.paths.can_begin_at_known();
-        let params = BlockParams {
+        let block =
+            BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
+        let of_frame = PathFrameParams {
+            frame: frame.params,
             known_hits: if begins_at_known { resources.address(Resource::KnownHits) } else { 0 },
-            pixel_filter: pixel_filter as u32,
-            cells: self.sampled.rays(),
             listed: self.uncovered.as_ref().map_or(0, |(u, _)| u.address()),
-            ..super::surfaces::block_params(frame, self.sampled)
+            cells: self.sampled.rays(),
+            listed_bits: 0,
         };
         let rr_depth = if frame.plan.progress.is_long { frame.settings.rest_rr_depth } else { 0 };
-        self.paths.begin(&frame.camera, &params, rr_depth)
+        self.paths.begin(&frame.camera, &block, of_frame, rr_depth)
     }
 
     fn record(&self, _: &mut Recorder, _: &Frame, _: &Resources, _: Range) -> Result<()> {

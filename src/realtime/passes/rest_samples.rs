@@ -2,11 +2,11 @@
 //! `primary` and `occlusion`, which take less time than the passes of frames in motion.
 
 use crate::error::Result;
-use crate::film::block::Block;
+use crate::film::block::{Block, BlockParams, PassParams};
 use crate::gpu::{ComputePipeline, Recorder};
-use crate::integrators::ao::{AoRays, Hemisphere};
+use crate::integrators::ao::AoRays;
 use crate::interface::PixelFilter;
-use crate::interface::records::block::BlockParams;
+use crate::interface::records::ao::AoParams;
 use crate::interface::records::radiance::RestSamplesParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
@@ -21,7 +21,7 @@ const SEED: u32 = 0x7265_7374;
 struct Traced {
     rays: AoRays,
     has_entry_points: bool,
-    block: Params<BlockParams>,
+    block: PassParams<AoParams>,
     resolve: ComputePipeline,
     params: Params<RestSamplesParams>,
 }
@@ -45,9 +45,9 @@ impl Traced {
     fn new(frame: &Frame, most: u32, sample_bits: u32) -> Result<Self> {
         let device = frame.tracer.device();
         Ok(Self {
-            rays: AoRays::new(frame.tracer, frame.settings.attenuation(), most, sample_bits, 0)?,
+            rays: AoRays::new(frame.tracer, frame.settings.occlusion, most, sample_bits, 0)?,
             has_entry_points: false,
-            block: Params::new(device, "block parameters of samples at rest")?,
+            block: PassParams::new(device, "block parameters of samples at rest")?,
             resolve: shaders::REST_SAMPLES.pipeline(device)?,
             params: Params::new(device, "parameters of samples at rest")?,
         })
@@ -67,17 +67,13 @@ impl Pass for RestSamples {
             Some(traced) => traced,
             None => self.traced.insert(Traced::new(frame, self.most, self.sample_bits)?),
         };
-        let (settings, attenuation) = (frame.settings, frame.settings.attenuation());
-        let seed = settings.seed.wrapping_add(SEED);
-        let block = traced.rays.params(BlockParams {
-            hemisphere: (settings.hemisphere == Hemisphere::Shading).into(),
-            falloff_log2: attenuation.falloff_log2() as f32,
-            radius: attenuation.reach() as f32,
+        let (settings, camera) = (frame.settings, &frame.camera);
+        let block = BlockParams {
             pixel_filter: if settings.antialias { PixelFilter::Box } else { PixelFilter::Centre } as u32,
-            ..frame.block.params(frame.block.size, &frame.camera, seed)
-        });
-        traced.has_entry_points = traced.rays.has_entry_points(&block);
-        traced.block.write(&block)?;
+            ..frame.block.params(frame.block.size, camera, settings.seed.wrapping_add(SEED))
+        };
+        traced.has_entry_points = traced.rays.has_entry_points(camera);
+        traced.block.write(&block, &traced.rays.params(settings.occlusion.record(), camera))?;
         traced.params.write(&RestSamplesParams {
             frame: frame.params,
             samples: traced.rays.samples(),
@@ -92,7 +88,7 @@ impl Pass for RestSamples {
         let sampled = Push {
             sample_index: frame.plan.placement.first_sample,
             sample_bits: self.sample_bits,
-            ..traced.block.push(frame, range)
+            ..frame.push(traced.block.address(), range)
         };
         // the range before reads the samples
         r.barrier();

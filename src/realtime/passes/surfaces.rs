@@ -48,7 +48,6 @@ pub fn stage(
 /// Parameters of a block of pixels that camera rays of a frame read.
 pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
     BlockParams {
-        frame: frame.params,
         centre_offset: frame.plan.offset,
         ..block.params(frame.block.size, &frame.camera, frame.settings.seed)
     }
@@ -67,19 +66,13 @@ impl Pass for Surfaces {
         let [materials, direct, known_hits] =
             [Resource::Materials, Resource::Direct, Resource::KnownHits].map(|r| resources.address(r));
         let lists = self.uncovered.as_ref().map(|u| u.outputs(frame)).unwrap_or_default();
-        let outputs = SurfacesParams { materials, direct, known_hits, ..lists };
-        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame, frame.block) }, &outputs)
+        let own = SurfacesParams { frame: frame.params, path: self.path, materials, direct, known_hits, ..lists };
+        self.rays.prepare(&block_params(frame, frame.block), &own)
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Range { first, count } = range;
-        let push = Push {
-            scene: frame.tracer.scene_address(),
-            first,
-            count,
-            sample_index: frame.plan.placement.first_sample,
-            ..Default::default()
-        };
+        let push = Push { sample_index: frame.plan.placement.first_sample, ..frame.push(0, range) };
         let uncovered = self.uncovered.as_ref().filter(|_| Uncovered::are_listed(frame));
         if let Some(uncovered) = uncovered.filter(|_| first == 0) {
             uncovered.clear(r);

@@ -93,27 +93,11 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                 if scale.iter().any(|s| (s / scale[0] - 1.0).abs() > 1e-6) {
                     continue;
                 }
-                for (primitive, s) in spheres.iter().enumerate() {
+                for (primitive, s) in (0..).zip(spheres) {
                     let centre = to_world.transform_point3(s.center.as_dvec3()) - *origin;
                     let radius = f64::from(s.radius) * scale[0];
-                    let record = LightRecord {
-                        kind: Kind::Sphere as u32,
-                        position: centre.as_vec3().to_array(),
-                        radius: radius as f32,
-                        primitive: primitive as u32,
-                        lift: ((centre.abs().max_element() + radius) * ROUNDING_BOUND) as f32,
-                        ..base
-                    };
-                    let bounds = Bounds {
-                        lo: centre - radius,
-                        hi: centre + radius,
-                        axis: DVec3::Z,
-                        spread: PI,
-                        falloff: 0.5 * PI,
-                        two_sided: false,
-                        intensity: PI * radius * radius * brightness,
-                    };
-                    of_primitives.push(all.push_placed(record, bounds));
+                    let record = LightRecord { primitive, ..base };
+                    of_primitives.push(add_sphere(all, centre, radius, brightness, record));
                 }
             }
         }
@@ -126,6 +110,27 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
     }
     light_of.extend(of_primitives);
     light_of
+}
+
+/// Adds a sphere, and returns its light. `base` is its record without place and shape.
+fn add_sphere(all: &mut LightCollector, centre: DVec3, radius: f64, brightness: f64, base: LightRecord) -> u32 {
+    let record = LightRecord {
+        kind: Kind::Sphere as u32,
+        position: centre.as_vec3().to_array(),
+        radius: radius as f32,
+        lift: ((centre.abs().max_element() + radius) * ROUNDING_BOUND) as f32,
+        ..base
+    };
+    let bounds = Bounds {
+        lo: centre - radius,
+        hi: centre + radius,
+        axis: DVec3::Z,
+        spread: PI,
+        falloff: 0.5 * PI,
+        two_sided: false,
+        intensity: PI * radius * radius * brightness,
+    };
+    all.push_placed(record, bounds)
 }
 
 /// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are

@@ -1,0 +1,15 @@
+//! Parameters of the pass that finds the surfaces of frames of ambient occlusion.
+
+records! {
+    "gbuffer";
+
+    /// Parameters of `gbuffer`, behind the `BlockParams`.
+    GbufferParams: Block(access: "readonly", align: 8) {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Axis of the hemisphere: 0 the geometric normal, 1 the shading normal.
+        hemisphere: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+}
