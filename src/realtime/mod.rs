@@ -231,8 +231,8 @@ impl Realtime {
     }
 
     /// Moves lights and emissive surfaces to where they are in `scene` from the next frame on, and
-    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated. Where
-    /// nothing has emitted light, and something does, frames begin without a history.
+    /// notes a change of light. `scene` is the tracer's in the pose to which that was updated.
+    /// Where nothing has emitted light, and something does, frames begin without a history.
     ///
     /// # Errors
     /// Those of the device; [`Error::Scene`] where lights were switched, which needs other shaders.

@@ -200,8 +200,8 @@ impl Scene {
         self.lights.is_empty() && self.is_black()
     }
 
-    /// Whether nothing in it emits light in its pose: as [`Scene::is_dark`], but there may be lights
-    /// whose intensity is 0.
+    /// Whether nothing in it emits light in its pose: as [`Scene::is_dark`], but there may be
+    /// lights whose intensity is 0.
     pub fn is_black(&self) -> bool {
         let shines = |i: &Instance| {
             let material = &self.materials[self.meshes[i.mesh].material];
