@@ -149,8 +149,8 @@ impl Ghosting {
     }
 
     /// Adds the share of `wrong`, what was right before a change, in an image. `settled` is its
-    /// final state, whose errors are no ghosts. `mask`: a value per pixel, above 0 where pixels take
-    /// part, for all of their channels. `None` where nothing differs.
+    /// final state, whose errors are no ghosts. `mask`: a value per pixel, above 0 where pixels
+    /// take part, for all of their channels. `None` where nothing differs.
     pub fn add_beside(
         &mut self,
         (image, settled): (&[f32], &[f32]),

@@ -1,5 +1,5 @@
-//! Which hits occlude, and how much: the settings of ambient occlusion that stills, frames and paths
-//! share.
+//! Which hits occlude, and how much: the settings of ambient occlusion that stills, frames and
+//! paths share.
 
 use super::Hemisphere;
 use crate::interface::records::ao::OcclusionRecord;

@@ -9,7 +9,7 @@ pub(super) use crate::interface::records::ray::INVALID;
 #[repr(C)]
 pub(super) struct LaunchParams {
     pub path: PathParams,
-    /// What frames in real time add; zero in stills.
+    /// Parameters that frames in real time add; zero in stills.
     pub of_frame: PathFrameParams,
 }
 

@@ -108,7 +108,8 @@ impl SignalPaths {
         self.paths.move_lights(tracer.device(), scene)
     }
 
-    /// Returns true if paths can begin at [`PathFrameParams::known_hits`], as they share camera rays.
+    /// Returns true if paths can begin at [`PathFrameParams::known_hits`], as they share camera
+    /// rays.
     pub fn can_begin_at_known(&self) -> bool {
         self.paths.pipelines.known.is_some()
     }
