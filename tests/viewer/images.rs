@@ -29,11 +29,13 @@ fn harness() -> Harness<'static, Images> {
     harness
 }
 
-/// The colour in the middle of the picture.
+/// The colour of pixel (20, 10), whose upper left corner is in the middle of the picture.
 fn middle(app: &Images) -> [u8; 3] {
     let picture = &app.layers()[0].picture;
     let [width, height] = picture.size.map(|n| n as usize);
-    let at = 4 * (height / 2 * width + width / 2);
+    let half = (width as f32 / 40.0).min(height as f32 / 20.0) / 2.0;
+    let [x, y] = [width, height].map(|n| (n as f32 / 2.0 + half) as usize);
+    let at = 4 * (y * width + x);
     [0, 1, 2].map(|c| picture.rgba[at + c])
 }
 

@@ -72,8 +72,8 @@ impl Display {
         Self { size, rgb }
     }
 
-    /// The part of it that a window shows: pixels as squares where they are enlarged, means where they
-    /// are reduced.
+    /// The part of it that a window shows: pixels as squares where they are enlarged, means where
+    /// they are reduced.
     pub fn view(&self, place: &Place) -> ViewPicture {
         let [width, height] = place.size.map(|n| n as usize);
         let mut rgba = vec![0; 4 * width * height];
