@@ -3,17 +3,17 @@
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::process::Child;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use super::browse::Browsing;
 use super::camera::CameraControl;
-use super::dialog::{Dialog, RenderedMotion};
+use super::dialog::{Dialog, RenderWanted, RenderedMotion};
 use super::file_kind::FileKind;
 use super::layer::Layer;
 use super::options::{CPU_FRAME_RATE, ViewOptions};
+use super::renders::Render;
 use super::request::{
     Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task,
 };
@@ -219,7 +219,9 @@ pub struct App {
     tasks: Vec<Task>,
     size: [u32; 2],
     layers: Vec<Layer>,
-    renders: Vec<(String, Child)>,
+    pub renders: Vec<Render>,
+    /// The program that renders: this one.
+    pub program: PathBuf,
 }
 
 impl App {
@@ -284,6 +286,7 @@ impl App {
             size: [0; 2],
             layers: Vec::new(),
             renders: Vec::new(),
+            program: std::env::current_exe().unwrap_or_else(|_| PathBuf::from("skylit")),
         };
 
         // settings come first: a scene keeps those that were given
@@ -1029,57 +1032,72 @@ impl App {
         self.default_frame_rate
     }
 
+    /// What a render is asked for unless the user says otherwise: the size of the window.
+    pub fn default_render(&self, motion: RenderedMotion) -> RenderWanted {
+        RenderWanted {
+            motion,
+            size: self.size,
+            spp: self.settings.image.spp.unwrap_or(STILL_SPP),
+            frames: TURNTABLE_FRAMES,
+            fps: ANIMATION_FPS,
+        }
+    }
+
+    /// The settings of a render that is asked for.
+    ///
+    /// # Errors
+    /// Those of [`App::render_settings`].
+    pub fn wanted_settings(&self, wanted: &RenderWanted) -> Result<RenderSettings> {
+        let mut settings = self.render_settings(wanted.motion)?;
+        settings.image.size = Some(wanted.size);
+        if settings.image.spp.is_some() {
+            settings.image.spp = Some(wanted.spp);
+        }
+        let frames = &mut settings.frames;
+        match wanted.motion {
+            RenderedMotion::Nothing => return Ok(settings),
+            RenderedMotion::Turntable => {
+                frames.orbit = Some(wanted.frames);
+                frames.frames = Some(FrameRange { first: 0, end: wanted.frames });
+            }
+            RenderedMotion::Animation => {
+                let seconds = f64::from(frames.range().end) / ANIMATION_FPS;
+                let end = (wanted.fps * seconds).ceil().max(1.0) as u32;
+                frames.frames = Some(FrameRange { first: 0, end });
+            }
+        }
+        frames.fps = Some(wanted.fps);
+        Ok(settings)
+    }
+
     /// Runs `skylit render` with what is shown and this output, as a program of its own.
-    pub fn render(&mut self, output: &str, motion: RenderedMotion) {
-        let mut settings = match self.render_settings(motion) {
+    pub fn render(&mut self, output: &str, wanted: &RenderWanted) {
+        let settings = match self.wanted_settings(wanted) {
             Ok(settings) => settings,
             Err(e) => return self.report(e.to_string(), true),
         };
-        settings.image.size = Some(self.size);
-        let source = self.scene.as_ref().map_or("", |s| s.source.as_str());
-        let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("skylit"));
-        let child = std::process::Command::new(program)
-            .arg("render")
-            .arg(source)
-            // defaults are among the settings already
-            .args(["--quiet", "--no-config", "-o", output])
-            .args(self.load_flags())
-            .args(settings.flags())
-            .stdin(std::process::Stdio::null())
-            .stderr(std::process::Stdio::piped())
-            .spawn();
-        match child {
-            Ok(child) => {
+        let source = self.scene.as_ref().map_or("", |s| s.source.as_str()).to_owned();
+        // defaults are among the settings already
+        let fixed = [source, "--no-config".into(), "-o".into(), output.to_owned()];
+        let arguments: Vec<String> = fixed.into_iter().chain(self.load_flags()).chain(settings.flags()).collect();
+        match Render::start(&self.program, &arguments, output) {
+            Ok(render) => {
                 self.report(format!("rendering {output}"), false);
-                self.renders.push((output.to_owned(), child));
+                self.renders.push(render);
             }
             Err(e) => self.report(format!("cannot start skylit render: {e}"), true),
         }
     }
 
-    /// Renders that are under way.
-    pub fn renders(&self) -> impl Iterator<Item = &str> {
-        self.renders.iter().map(|(output, _)| output.as_str())
-    }
-
+    /// Tells of renders that have ended.
     fn watch_renders(&mut self, context: &egui::Context) {
-        let (mut messages, mut running) = (Vec::new(), Vec::new());
-        for (output, mut child) in std::mem::take(&mut self.renders) {
-            match child.try_wait() {
-                Ok(None) => running.push((output, child)),
-                Ok(Some(status)) if status.success() => messages.push((format!("rendered {output}"), false)),
-                Ok(Some(_)) => {
-                    let mut text = String::new();
-                    if let Some(mut stderr) = child.stderr.take() {
-                        // without it there is the exit code
-                        let _ = std::io::Read::read_to_string(&mut stderr, &mut text);
-                    }
-                    messages.push((format!("{output}: {}", text.trim().trim_start_matches("skylit: error: ")), true));
-                }
-                Err(e) => messages.push((format!("{output}: {e}"), true)),
-            }
-        }
-        self.renders = running;
+        let mut messages = Vec::new();
+        self.renders.retain_mut(|render| {
+            let ended = render.ended();
+            let goes_on = ended.is_none();
+            messages.extend(ended);
+            goes_on
+        });
         messages.into_iter().for_each(|(text, is_error)| self.report(text, is_error));
         if !self.renders.is_empty() {
             context.request_repaint_after(Duration::from_millis(200));

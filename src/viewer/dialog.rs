@@ -11,8 +11,22 @@ pub enum Dialog {
     LoadSettings(String),
     /// For a file of settings to write.
     SaveSettings(String),
-    /// For the output of `skylit render`.
-    Render(String, RenderedMotion),
+    /// For the output of `skylit render`, and its settings.
+    Render(String, RenderWanted),
+}
+
+/// What is asked of `skylit render`. Of each motion it has the numbers that apply to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderWanted {
+    pub motion: RenderedMotion,
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Samples per pixel; of a still.
+    pub spp: u32,
+    /// Frames; of a turntable.
+    pub frames: u32,
+    /// Frames per second.
+    pub fps: f64,
 }
 
 /// The motion in the frames of `skylit render`.

@@ -19,6 +19,7 @@ mod options;
 pub mod painter;
 pub mod panels;
 mod recent;
+pub mod renders;
 pub mod request;
 mod rounding;
 #[cfg(feature = "probes")]

@@ -9,7 +9,7 @@ use skylit::renderer::interactive::{Pick, ViewPicture};
 use skylit::scene::load::{NormalSource, Projection, VertexOptions};
 use skylit::settings::Length;
 use skylit::viewer::app::{App, Arrangement, Second};
-use skylit::viewer::dialog::RenderedMotion;
+use skylit::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
 use skylit::viewer::request::{
     Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, TRUTH, Task,
 };
@@ -854,4 +854,69 @@ fn environments_are_chosen_and_turned() {
     alone.click("The scene's own");
     let lighting = alone.mailbox.peek().lighting;
     assert_eq!((lighting.environment, lighting.environment_turn, lighting.environment_scale), (None, None, None));
+}
+
+/// A render is asked for with its size, samples and frames; it shows how far it is, and can be cancelled.
+#[cfg(unix)]
+#[test]
+fn renders_are_asked_for_watched_and_cancelled() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let dir = tempfile::tempdir().unwrap();
+    let program = dir.path().join("program");
+    let is = |script: &str| {
+        std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    let told = dir.path().join("told");
+    let output = dir.path().join("a.apng").to_string_lossy().into_owned();
+    let mut alone = loaded();
+    alone.change(|app| app.program = program.clone());
+    let wait = |alone: &mut Alone, until: &dyn Fn(&mut Alone) -> bool| {
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(20);
+        while !until(alone) {
+            assert!(std::time::Instant::now() < end);
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            alone.harness.run_steps(1);
+        }
+    };
+
+    // what it is asked for
+    is(&format!(
+        "echo $@ > {}; echo 'skylit: rendering: 40 % after 2 s, about 3 s left' >&2; exec sleep 30",
+        told.display()
+    ));
+    alone.change(|app| app.first = Technique::Preset(skylit::realtime::Preset::Fast));
+    let wanted = alone.harness.state().default_render(RenderedMotion::Turntable);
+    assert_eq!((wanted.size, wanted.frames), (alone.harness.state().size(), 120));
+    let wanted = RenderWanted { size: [320, 180], frames: 48, fps: 24.0, ..wanted };
+    alone.change(|app| app.render(&output, &wanted));
+    wait(&mut alone, &|alone| alone.harness.state().renders.iter().any(|render| render.progress().is_some()));
+    let line = std::fs::read_to_string(&told).unwrap();
+    for part in
+        ["render builtin:stairs", "a.apng", "--size 320x180", "--orbit 48", "--frames 0..48", "--fps 24", "--lead-in"]
+    {
+        assert!(line.contains(part), "{part}: {line}");
+    }
+    let progress = alone.harness.state().renders[0].progress().unwrap();
+    assert_eq!(progress, (0.4, "after 2 s, about 3 s left".into()));
+
+    // cancelled by its button
+    alone.click("✖");
+    wait(&mut alone, &|alone| alone.harness.state().renders.is_empty());
+    assert!(alone.shows("was cancelled"));
+
+    // what went wrong is said
+    is("echo 'skylit: error: a.apng: the disk is full' >&2; exit 4");
+    alone.change(|app| app.render(&output, &wanted));
+    wait(&mut alone, &|alone| alone.harness.state().renders.is_empty());
+    assert!(alone.shows("the disk is full"));
+
+    // in the window: the size from a list
+    alone.change(|app| app.dialog = Some(Dialog::Render(output.clone(), wanted.clone())));
+    alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Size").click();
+    alone.harness.run_steps(5);
+    alone.click("1920 x 1080");
+    let Some(Dialog::Render(_, changed)) = &alone.harness.state().dialog else { panic!() };
+    assert_eq!(*changed, RenderWanted { size: [1920, 1080], ..wanted });
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
 use crate::viewer::app::{App, Second};
 use crate::viewer::browse::Browsing;
-use crate::viewer::dialog::{Dialog, RenderedMotion};
+use crate::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
 use crate::viewer::request::Task;
 
 /// Keys and mouse, for the help window and docs/viewer.md.
@@ -40,6 +40,9 @@ pub const CONTROLS: &[(&str, &str)] = &[
     ("Tab, Enter", "go through all controls, use them"),
     ("?, Escape", "this help, close a window"),
 ];
+
+/// Greatest side of a render, pixels.
+const MAX_RENDER_SIDE: u32 = 16_384;
 
 /// Shows what is open.
 pub fn show(app: &mut App, context: &Context) {
@@ -111,6 +114,9 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
                 edit.request_focus();
             }
             done = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+            if let Dialog::Render(_, wanted) = &mut dialog {
+                render_numbers(app, ui, wanted);
+            }
             ui.horizontal(|ui| {
                 done |= ui.button(action).clicked();
                 ui.add_enabled_ui(app.browsing.is_none(), |ui| browses = ui.button("Browse…").clicked());
@@ -136,6 +142,46 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
     }
 }
 
+/// Sizes that are offered beside that of the window, pixels.
+const SIZES: [[u32; 2]; 4] = [[640, 360], [1280, 720], [1920, 1080], [3840, 2160]];
+
+/// Size, samples and frames of a render.
+fn render_numbers(app: &App, ui: &mut Ui, wanted: &mut RenderWanted) {
+    let number = |ui: &mut Ui, label: &str, value: &mut u32, most: u32| {
+        ui.horizontal(|ui| {
+            let heading = ui.label(label);
+            ui.add(egui::DragValue::new(value).range(1..=most)).labelled_by(heading.id);
+        });
+    };
+    ui.horizontal(|ui| {
+        let heading = ui.label("Size");
+        let name = |[width, height]: [u32; 2]| format!("{width} x {height}");
+        let list = egui::ComboBox::from_id_salt("size").selected_text(name(wanted.size)).show_ui(ui, |ui| {
+            ui.selectable_value(&mut wanted.size, app.size(), format!("{} (this window)", name(app.size())));
+            for size in SIZES {
+                ui.selectable_value(&mut wanted.size, size, name(size));
+            }
+        });
+        list.response.labelled_by(heading.id);
+        for (side, label) in wanted.size.iter_mut().zip(["Width", "Height"]) {
+            let response = ui.add(egui::DragValue::new(side).range(1..=MAX_RENDER_SIDE));
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::DragValue, true, label));
+        }
+    });
+    if app.shown_settings().realtime_setting().is_none() {
+        number(ui, "Samples per pixel", &mut wanted.spp, 1 << 20);
+    }
+    if wanted.motion == RenderedMotion::Turntable {
+        number(ui, "Frames", &mut wanted.frames, 100_000);
+    }
+    if wanted.motion != RenderedMotion::Nothing {
+        ui.horizontal(|ui| {
+            let heading = ui.label("Frames per second");
+            ui.add(egui::DragValue::new(&mut wanted.fps).range(1.0..=240.0)).labelled_by(heading.id);
+        });
+    }
+}
+
 fn act(app: &mut App, dialog: Dialog) {
     if let Dialog::Save(text) | Dialog::SaveSettings(text) | Dialog::Render(text, _) = &dialog
         && let Some(scene) = &app.scene
@@ -156,7 +202,7 @@ fn act(app: &mut App, dialog: Dialog) {
         Dialog::Save(text) => {
             app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) })
         }
-        Dialog::Render(text, motion) => app.render(text.trim(), motion),
+        Dialog::Render(text, wanted) => app.render(text.trim(), &wanted),
         Dialog::LoadSettings(text) => match app.load_settings(Path::new(text.trim())) {
             Ok(()) => app.report(format!("loaded {}", text.trim()), false),
             Err(e) => app.report(e.to_string(), true),

@@ -91,15 +91,15 @@ fn file(app: &mut App, ui: &mut Ui) {
         app.dialog = Some(Dialog::Save(format!("{}.png", stem(app))));
     }
     if item(ui, "Render this view…", None, "") {
-        app.dialog = Some(Dialog::Render(format!("{}.exr", stem(app)), RenderedMotion::Nothing));
+        app.dialog = Some(render_dialog(app, "exr", RenderedMotion::Nothing));
     }
     ui.add_enabled_ui(app.shown_settings().realtime_setting().is_some(), |ui| {
         if item(ui, "Render a turntable…", None, "") {
-            app.dialog = Some(Dialog::Render(format!("{}.turntable.apng", stem(app)), RenderedMotion::Turntable));
+            app.dialog = Some(render_dialog(app, "turntable.apng", RenderedMotion::Turntable));
         }
         ui.add_enabled_ui(app.playback.animation.is_some(), |ui| {
             if item(ui, "Render the animation…", None, "") {
-                app.dialog = Some(Dialog::Render(format!("{}.apng", stem(app)), RenderedMotion::Animation));
+                app.dialog = Some(render_dialog(app, "apng", RenderedMotion::Animation));
             }
         });
     });
@@ -119,6 +119,11 @@ fn file(app: &mut App, ui: &mut Ui) {
     if item(ui, "Quit", Some(&shortcuts::QUIT), "") {
         app.closes = true;
     }
+}
+
+/// The dialog that asks for a render.
+fn render_dialog(app: &App, extension: &str, motion: RenderedMotion) -> Dialog {
+    Dialog::Render(format!("{}.{extension}", stem(app)), app.default_render(motion))
 }
 
 /// Puts the command that renders what is shown on the clipboard.

@@ -44,9 +44,15 @@ pub fn show(app: &mut App, ui: &mut Ui) {
             ui.strong("paused");
             ui.separator();
         }
-        for output in app.renders() {
-            ui.spinner();
-            ui.label(format!("rendering {output}"));
+        for render in &mut app.renders {
+            let (share, rest) = render.progress().unwrap_or_default();
+            let bar = egui::ProgressBar::new(share).desired_width(80.0).show_percentage();
+            ui.add(bar);
+            ui.label(&render.output).on_hover_text(format!("rendering {} {rest}", render.output));
+            if ui.small_button("✖").on_hover_text(format!("Cancel {}", render.output)).clicked() {
+                render.cancel();
+            }
+            ui.separator();
         }
         if let Some((_, text, is_error)) = app.messages.front() {
             let text = egui::RichText::new(text);

@@ -8,14 +8,33 @@ use ::gltf::json::accessor::ComponentType;
 #[derive(Default)]
 pub(super) struct Decoded {
     /// Bytes of buffer views, by the index of the view.
-    pub views: BTreeMap<usize, Result<Vec<u8>, String>>,
+    pub views: BTreeMap<usize, Result<DecodedBytes, String>>,
     /// Elements of accessors, by the index of the accessor.
     pub accessors: BTreeMap<usize, Result<DecodedElements, String>>,
 }
 
+/// Bytes in the memory that their decoder has filled: a copy of them would be as large again.
+pub(super) enum DecodedBytes {
+    Bytes(Vec<u8>),
+    Halfwords(Vec<u16>),
+    Words(Vec<u32>),
+}
+
+impl std::ops::Deref for DecodedBytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Halfwords(halfwords) => bytemuck::cast_slice(halfwords),
+            Self::Words(words) => bytemuck::cast_slice(words),
+        }
+    }
+}
+
 /// Elements of an accessor, one after the other.
 pub(super) struct DecodedElements {
-    pub bytes: Vec<u8>,
+    pub bytes: DecodedBytes,
     pub component: ComponentType,
     /// Number of elements, which may differ from what the accessor declares.
     pub count: u64,

@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use super::{DRACO, draco_extension};
 use crate::scene::load::gltf::accessor::Reader;
-use crate::scene::load::gltf::decoded::DecodedElements;
+use crate::scene::load::gltf::decoded::{DecodedBytes, DecodedElements};
 use crate::scene::load::gltf::values::valid;
 
 /// Content of the extension of a primitive.
@@ -123,10 +123,10 @@ fn attribute_elements(
     let (component, bytes) = if component_type(attribute.data_type()) == Some(declared.0)
         && usize::from(attribute.num_components()) == components
     {
-        (declared.0, copy_values(attribute, points)?)
+        (declared.0, DecodedBytes::Bytes(copy_values(attribute, points)?))
     } else {
         let floats = attribute.read_f32s(points, components);
-        (ComponentType::F32, bytemuck::cast_slice(&floats).to_vec())
+        (ComponentType::F32, DecodedBytes::Words(bytemuck::cast_vec(floats)))
     };
     Ok(DecodedElements { bytes, component, count: points as u64 })
 }
@@ -150,7 +150,7 @@ fn copy_values(attribute: &PointAttribute, points: usize) -> Result<Vec<u8>, Str
 fn corners(mesh: &Mesh) -> DecodedElements {
     let corners: Vec<u32> = mesh.faces().iter().flat_map(|face| face.map(|point| point.0)).collect();
     let count = corners.len() as u64;
-    DecodedElements { bytes: bytemuck::cast_slice(&corners).to_vec(), component: ComponentType::U32, count }
+    DecodedElements { bytes: DecodedBytes::Words(corners), component: ComponentType::U32, count }
 }
 
 /// The component type of glTF that holds numbers of this kind.

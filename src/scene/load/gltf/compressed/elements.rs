@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::meshopt::extension;
 use crate::scene::load::gltf::accessor::Reader;
+use crate::scene::load::gltf::decoded::DecodedBytes;
 
 /// Content of the extension of a buffer view.
 #[derive(Deserialize)]
@@ -45,7 +46,7 @@ enum Filter {
 }
 
 /// Decodes a compressed buffer view.
-pub(super) fn decode(reader: &Reader, view: usize) -> Result<Vec<u8>, String> {
+pub(super) fn decode(reader: &Reader, view: usize) -> Result<DecodedBytes, String> {
     let (name, value) = extension(reader.document, view).ok_or("is not compressed")?;
     let fail = |e: String| format!("buffer view {view} ({name}) {e}");
     let compressed: CompressedView =
@@ -64,7 +65,7 @@ pub(super) fn decode(reader: &Reader, view: usize) -> Result<Vec<u8>, String> {
 }
 
 /// Decoded and filtered elements of a view.
-fn elements(bytes: &[u8], view: &CompressedView) -> Result<Vec<u8>, String> {
+fn elements(bytes: &[u8], view: &CompressedView) -> Result<DecodedBytes, String> {
     let count = usize::try_from(view.count).map_err(|_| "has too many elements".to_owned())?;
     let stride = view.byte_stride;
     let broken = |_| "holds broken data".to_owned();
@@ -74,22 +75,22 @@ fn elements(bytes: &[u8], view: &CompressedView) -> Result<Vec<u8>, String> {
             let decoder = decoder.ok_or_else(|| format!("has a stride of {stride} bytes, no multiple of 4 to 256"))?;
             let mut words = decoder(bytes, count).map_err(broken)?;
             apply_filter(&mut words, view)?;
-            Ok(bytemuck::cast_slice(&words).to_vec())
+            Ok(DecodedBytes::Words(words))
         }
         _ if view.filter != Filter::None => Err("has a filter for what is not an attribute".to_owned()),
         Mode::Triangles if !count.is_multiple_of(3) => Err(format!("has {count} corners, no multiple of three")),
         Mode::Triangles if stride == 2 => {
-            meshopt::decode_index_buffer::<u16>(bytes, count).map(|v| bytemuck::cast_slice(&v).to_vec()).map_err(broken)
+            meshopt::decode_index_buffer::<u16>(bytes, count).map(DecodedBytes::Halfwords).map_err(broken)
         }
         Mode::Triangles if stride == 4 => {
-            meshopt::decode_index_buffer::<u32>(bytes, count).map(|v| bytemuck::cast_slice(&v).to_vec()).map_err(broken)
+            meshopt::decode_index_buffer::<u32>(bytes, count).map(DecodedBytes::Words).map_err(broken)
         }
-        Mode::Indices if stride == 2 => meshopt::decode_index_sequence::<u16>(bytes, count)
-            .map(|v| bytemuck::cast_slice(&v).to_vec())
-            .map_err(broken),
-        Mode::Indices if stride == 4 => meshopt::decode_index_sequence::<u32>(bytes, count)
-            .map(|v| bytemuck::cast_slice(&v).to_vec())
-            .map_err(broken),
+        Mode::Indices if stride == 2 => {
+            meshopt::decode_index_sequence::<u16>(bytes, count).map(DecodedBytes::Halfwords).map_err(broken)
+        }
+        Mode::Indices if stride == 4 => {
+            meshopt::decode_index_sequence::<u32>(bytes, count).map(DecodedBytes::Words).map_err(broken)
+        }
         _ => Err(format!("has indices of {stride} bytes, neither 2 nor 4")),
     }
 }

@@ -22,7 +22,7 @@ use serde_json::Value;
 pub(super) use meshopt::{EXTENSIONS as MESHOPT, buffer_of_view};
 
 use super::accessor::Reader;
-use super::decoded::{Decoded, DecodedElements};
+use super::decoded::{Decoded, DecodedBytes, DecodedElements};
 #[cfg(any(feature = "draco", feature = "meshopt"))]
 use crate::scene::load::options::LoadPart;
 use crate::scene::load::options::LoadProgress;
@@ -57,13 +57,13 @@ fn decode_all<T: Sync, R: Send>(all: &[T], decode: impl Fn(&T) -> R + Sync, prog
 }
 
 #[cfg(not(feature = "meshopt"))]
-fn decode_views(_: &Reader, _: Listener) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+fn decode_views(_: &Reader, _: Listener) -> BTreeMap<usize, Result<DecodedBytes, String>> {
     BTreeMap::new()
 }
 
 /// Decodes buffer views that meshoptimizer packed.
 #[cfg(feature = "meshopt")]
-fn decode_views(reader: &Reader, progress: Listener) -> BTreeMap<usize, Result<Vec<u8>, String>> {
+fn decode_views(reader: &Reader, progress: Listener) -> BTreeMap<usize, Result<DecodedBytes, String>> {
     let is_compressed = |&i: &usize| meshopt::is_compressed(reader.document, i);
     let compressed: Vec<usize> = (0..reader.document.buffer_views.len()).filter(is_compressed).collect();
     decode_all(&compressed, |&i| (i, elements::decode(reader, i)), progress).into_iter().collect()
