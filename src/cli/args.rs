@@ -8,7 +8,7 @@ use clap::{Args, ValueHint};
 use crate::error::Result;
 use crate::integrators::rays::Mode;
 use crate::renderer::Renderer;
-use crate::scene::load::{Confine, LoadOptions, NormalSource, Projection, VertexOptions, load_with};
+use crate::scene::load::{Confine, GeometryOptions, LoadOptions, NormalSource, Projection, UpAxis, load_with};
 use crate::scene::{Scene, SceneSettings};
 use crate::settings::parse::parse_limit;
 use crate::terminal::console::{Console, Verbosity};
@@ -27,6 +27,9 @@ pub struct LoadArgs {
     /// Texture coordinates for meshes that have none and whose material has textures, projected from the bounds of each mesh [default: none]
     #[arg(long, value_enum, value_name = "PROJECTION", help_heading = "Scene", hide_short_help = true)]
     pub uv: Option<Projection>,
+    /// Axis of the file that points up: z in files of CAD programs, robots and maps [default: y]
+    #[arg(long, value_enum, value_name = "y|z", help_heading = "Scene", hide_short_help = true)]
+    pub up: Option<UpAxis>,
     /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
     ///
     /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
@@ -37,8 +40,8 @@ pub struct LoadArgs {
 impl LoadArgs {
     /// The options of the loader.
     pub fn options(&self) -> LoadOptions<'_> {
-        let (scene, confine, vertices) = (self.gltf_scene.as_deref(), self.confine(), self.vertices());
-        LoadOptions { scene, confine, vertices, ..LoadOptions::default() }
+        let (scene, confine, geometry) = (self.gltf_scene.as_deref(), self.confine(), self.geometry());
+        LoadOptions { scene, confine, geometry, ..LoadOptions::default() }
     }
 
     /// Loads a scene, and shows the progress.
@@ -53,9 +56,10 @@ impl LoadArgs {
         })
     }
 
-    /// The normals and texture coordinates that the options ask for.
-    pub fn vertices(&self) -> VertexOptions {
-        VertexOptions { normals: self.normals.unwrap_or_default(), uv: self.uv }
+    /// How the options understand the geometry.
+    pub fn geometry(&self) -> GeometryOptions {
+        let (normals, up) = (self.normals.unwrap_or_default(), self.up.unwrap_or_default());
+        GeometryOptions { normals, uv: self.uv, up }
     }
 
     /// Where the files must lie that a scene refers to.

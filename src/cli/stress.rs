@@ -79,7 +79,7 @@ impl StressArgs {
             checks: self.checks.clone(),
             program: std::env::current_exe().ok(),
             confine: self.load.confine,
-            vertices: self.load.vertices(),
+            geometry: self.load.geometry(),
         })
     }
 

@@ -171,7 +171,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         scene: scene.cloned(),
         gltf_scene: args.load.gltf_scene.clone(),
         confine,
-        vertices: args.load.vertices(),
+        geometry: args.load.geometry(),
         size: settings.image.size.unwrap_or(DEFAULT_SIZE),
         settings,
         device: device_settings,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::scene::load::VertexOptions;
+use crate::scene::load::GeometryOptions;
 
 /// The amount of rays that are traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -41,5 +41,5 @@ pub struct Options {
     /// The scene may refer to files below its own folder alone.
     pub confine: bool,
     /// Normals and texture coordinates of the scene.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
 }

@@ -89,7 +89,7 @@ impl Setup {
     /// [`Error::Device`] for a tracer that the device lacks; errors of the device and the scene.
     pub(super) fn open(options: &Options, settings: &DeviceSettings) -> Result<Self> {
         let confine = if options.confine { Confine::SceneFolder } else { Confine::Nowhere };
-        let load_options = LoadOptions { confine, vertices: options.vertices, ..LoadOptions::default() };
+        let load_options = LoadOptions { confine, geometry: options.geometry, ..LoadOptions::default() };
         let load = |scene: &str| load::load_with(scene, &load_options);
         let scene = options.scene.as_deref().map(load).transpose()?;
         let device = Device::open(&GpuOptions { keep_pipelines: KEPT_PIPELINES, ..settings.options() })?;

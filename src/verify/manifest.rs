@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
 use crate::renderer::RenderSettings;
 use crate::scene::builtin;
-use crate::scene::load::{Confine, LoadOptions, Projection, VertexOptions, confine};
+use crate::scene::load::{Confine, GeometryOptions, LoadOptions, Projection, UpAxis, confine};
 use crate::tracer::TracerKind;
 
 /// Name of the manifest in its folder.
@@ -49,7 +49,7 @@ pub struct Frame {
     /// Which scene of a glTF file, by its name or number; `None`: the one that the file names.
     pub gltf_scene: Option<String>,
     /// Normals and texture coordinates that are not the file's.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
     pub settings_file: Option<PathBuf>,
     /// The settings; files are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
@@ -141,6 +141,7 @@ struct Entry {
     gltf_scene: Option<Spanned<String>>,
     normals: Option<Spanned<Normals>>,
     uv: Option<Spanned<String>>,
+    up: Option<Spanned<String>>,
     render: Option<Spanned<String>>,
     settings: Option<Spanned<PathBuf>>,
     tracers: Option<Spanned<Vec<String>>>,
@@ -341,8 +342,8 @@ impl Frame {
 
     /// How its scene is loaded. `confine`: where the files must lie that it refers to.
     pub fn load_options<'a>(&'a self, confine: Confine<'a>) -> LoadOptions<'a> {
-        let (scene, vertices) = (self.gltf_scene.as_deref(), self.vertices);
-        LoadOptions { confine, scene, vertices, ..LoadOptions::default() }
+        let (scene, geometry) = (self.gltf_scene.as_deref(), self.geometry);
+        LoadOptions { confine, scene, geometry, ..LoadOptions::default() }
     }
 
     /// Whether it is rendered on this driver.
@@ -368,7 +369,7 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
         name: one_line(entry.name.get_ref()),
         scene: entry.scene.get_ref().clone(),
         gltf_scene: entry.gltf_scene.as_ref().map(|scene| scene.get_ref().clone()),
-        vertices: VertexOptions::default(),
+        geometry: GeometryOptions::default(),
         settings_file: entry.settings.as_ref().map(|file| folder.join(file.get_ref())),
         settings: RenderSettings::default(),
         tracers: Tracers::Auto,
@@ -385,22 +386,27 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
 }
 
 /// The normals and texture coordinates that an entry asks for.
-fn vertices(source: &Source, entry: &Entry) -> Result<VertexOptions> {
-    let mut vertices = VertexOptions::default();
+fn geometry(source: &Source, entry: &Entry) -> Result<GeometryOptions> {
+    let mut geometry = GeometryOptions::default();
     if let Some(normals) = &entry.normals {
         let text = match normals.get_ref() {
             Normals::Word(word) => word.clone(),
             Normals::Angle(degrees) => degrees.to_string(),
         };
-        vertices.normals = text.parse().map_err(|e| source.error(normals.span(), format!("normals = {text}: {e}")))?;
+        geometry.normals = text.parse().map_err(|e| source.error(normals.span(), format!("normals = {text}: {e}")))?;
     }
     if let Some(uv) = &entry.uv {
         let projection = Projection::ALL.into_iter().find(|p| p.name() == uv.get_ref());
         let names = || Projection::ALL.map(Projection::name).join(", ");
         let unknown = || source.error(uv.span(), format!("uv = {}: one of {} expected", uv.get_ref(), names()));
-        vertices.uv = Some(projection.ok_or_else(unknown)?);
+        geometry.uv = Some(projection.ok_or_else(unknown)?);
     }
-    Ok(vertices)
+    if let Some(up) = &entry.up {
+        let axis = UpAxis::ALL.into_iter().find(|axis| axis.name() == up.get_ref());
+        let unknown = || source.error(up.span(), format!("up = {}: y or z expected", up.get_ref()));
+        geometry.up = axis.ok_or_else(unknown)?;
+    }
+    Ok(geometry)
 }
 
 /// Reads what may be wrong with a frame.
@@ -423,7 +429,7 @@ fn complete(
             source.error(chosen.span(), format!("gltf_scene: {} is no glTF file, which may have several", frame.scene))
         );
     }
-    frame.vertices = vertices(source, entry)?;
+    frame.geometry = geometry(source, entry)?;
     frame.settings = settings(source, folder, defaults, entry)?;
     let golden = folder.join(format!("{}.{}", frame.name, frame.format.extension()));
     let environment = frame.settings.lighting.environment_file();
@@ -572,6 +578,7 @@ mod tests {
         for (keys, options) in [
             ("normals = \"flat\"", "--normals flat "),
             ("normals = \"smooth\", uv = \"box\"", "--normals smooth --uv box "),
+            ("up = \"z\"", "--up z "),
             ("normals = 30", "--normals 30 "),
             ("normals = 30.5", "--normals 30.5 "),
             ("normals = \"file\"", "--integrator ao "),
@@ -582,6 +589,7 @@ mod tests {
         for (keys, why) in [
             ("normals = \"round\"", "line 1: normals = round: file, flat, smooth or an angle from 0 to 180 degrees"),
             ("normals = 181", "line 1: normals = 181: file, flat"),
+            ("up = \"x\"", "line 1: up = x: y or z expected"),
             ("uv = \"planar\"", "line 1: uv = planar: one of spherical, cylindrical, box expected"),
         ] {
             let problem = frame(keys).unwrap().problem.unwrap();

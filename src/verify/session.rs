@@ -10,7 +10,7 @@ use crate::film::Control;
 use crate::gpu::{Device, DeviceInfo, Options};
 use crate::output::Image;
 use crate::renderer::Renderer;
-use crate::scene::load::{self, Confine, VertexOptions};
+use crate::scene::load::{self, Confine, GeometryOptions};
 use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
 
 /// Compiled pipelines kept from scene to scene: most of what small images cost on a CPU driver.
@@ -27,7 +27,7 @@ pub struct VerifySession<'m> {
 struct OpenRenderer {
     scene: String,
     gltf_scene: Option<String>,
-    vertices: VertexOptions,
+    geometry: GeometryOptions,
     kind: TracerKind,
     renderer: Renderer,
 }
@@ -90,7 +90,7 @@ impl<'m> VerifySession<'m> {
         };
         let confine = self.manifest.confine.as_deref().map_or(Confine::Nowhere, Confine::Folder);
         let is_scene = |open: &OpenRenderer| {
-            open.scene == frame.scene && open.gltf_scene == frame.gltf_scene && open.vertices == frame.vertices
+            open.scene == frame.scene && open.gltf_scene == frame.gltf_scene && open.geometry == frame.geometry
         };
         let open = match self.open.take() {
             Some(open) if is_scene(&open) && open.kind == kind => open,
@@ -103,7 +103,7 @@ impl<'m> VerifySession<'m> {
                 // the manifest's name: a golden image is the same whichever folder it was made in
                 let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
                 let (scene, gltf_scene) = (frame.scene.clone(), frame.gltf_scene.clone());
-                OpenRenderer { scene, gltf_scene, vertices: frame.vertices, kind, renderer }
+                OpenRenderer { scene, gltf_scene, geometry: frame.geometry, kind, renderer }
             }
         };
         Ok(&mut self.open.insert(open).renderer)

@@ -29,7 +29,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
-use crate::scene::load::{LoadOptions, VertexOptions};
+use crate::scene::load::{GeometryOptions, LoadOptions};
 use crate::scene::settings::variant_index;
 use crate::scene::{Camera, Projection};
 use crate::settings::{Capability, Length};
@@ -207,9 +207,9 @@ pub struct App {
     /// Which scene of a glTF file is shown; none: the one that the file names.
     pub gltf_scene: Option<String>,
     /// Normals and texture coordinates of all scenes that are opened.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
     /// Normals and texture coordinates of the last scene that was opened.
-    opened_vertices: VertexOptions,
+    opened_geometry: GeometryOptions,
     /// Text to be put on the clipboard.
     pub copied: Option<String>,
     /// The window is to be closed.
@@ -277,8 +277,8 @@ impl App {
             first_animation: None,
             exposure: (false, None),
             gltf_scene: options.gltf_scene.clone(),
-            vertices: options.vertices,
-            opened_vertices: options.vertices,
+            geometry: options.geometry,
+            opened_geometry: options.geometry,
             copied: None,
             closes: false,
             default_frame_rate: options.frame_rate.unwrap_or(CPU_FRAME_RATE),
@@ -382,14 +382,14 @@ impl App {
             self.gltf_scene = None;
         }
         self.source = Some(source.to_owned());
-        self.opened_vertices = self.vertices;
+        self.opened_geometry = self.geometry;
         (self.modified, self.failure) = (None, None);
         self.loading = Some((format!("loading {source}"), None));
     }
 
     /// Normals and texture coordinates of the last scene that was opened.
-    pub fn opened_vertices(&self) -> VertexOptions {
-        self.opened_vertices
+    pub fn opened_geometry(&self) -> GeometryOptions {
+        self.opened_geometry
     }
 
     /// Stops loading: the scene before stays.
@@ -776,7 +776,7 @@ impl App {
         let request = Request {
             scene: self.source.clone(),
             gltf_scene: self.gltf_scene.clone(),
-            vertices: self.vertices,
+            geometry: self.geometry,
             load: self.load,
             device: self.device_settings.clone(),
             meaning: self.settings.scene.clone(),
@@ -1024,7 +1024,7 @@ impl App {
 
     /// The options by which the scene is loaded, as words of the command line.
     fn load_flags(&self) -> Vec<String> {
-        LoadOptions { scene: self.gltf_scene.as_deref(), vertices: self.vertices, ..LoadOptions::default() }.flags()
+        LoadOptions { scene: self.gltf_scene.as_deref(), geometry: self.geometry, ..LoadOptions::default() }.flags()
     }
 
     /// The frame rate to hold unless another is chosen.

@@ -1,7 +1,7 @@
 //! Options that the viewer starts with.
 
 use crate::renderer::RenderSettings;
-use crate::scene::load::{Confine, LoadOptions, VertexOptions};
+use crate::scene::load::{Confine, GeometryOptions, LoadOptions};
 use crate::tracer::DeviceSettings;
 
 /// Frame rate that is held on CPU drivers, frames per second.
@@ -30,7 +30,7 @@ pub struct ViewOptions {
     /// Where the files lie that a scene may refer to, of scenes that are opened later, too.
     pub confine: Confine<'static>,
     /// Normals and texture coordinates of all scenes that are opened.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
     /// Settings of images.
     pub settings: RenderSettings,
     /// Device and tracer.
@@ -48,6 +48,6 @@ pub struct ViewOptions {
 impl ViewOptions {
     /// How scenes are loaded.
     pub fn load(&self) -> LoadOptions<'static> {
-        LoadOptions { confine: self.confine, vertices: self.vertices, ..LoadOptions::default() }
+        LoadOptions { confine: self.confine, geometry: self.geometry, ..LoadOptions::default() }
     }
 }

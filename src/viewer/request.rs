@@ -13,7 +13,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
-use crate::scene::load::VertexOptions;
+use crate::scene::load::GeometryOptions;
 use crate::scene::{Camera, SceneSettings};
 use crate::tracer::DeviceSettings;
 
@@ -31,7 +31,7 @@ pub struct Request {
     /// Which scene of a glTF file; none: the one that the file names.
     pub gltf_scene: Option<String>,
     /// Normals and texture coordinates that are not the file's.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
     /// Incremented to load the scene anew.
     pub load: u64,
     /// Device and tracer.

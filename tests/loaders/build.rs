@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use skylit::error::Result;
-use skylit::scene::load::{LoadOptions, Projection, VertexOptions, load_with};
+use skylit::scene::load::{GeometryOptions, LoadOptions, Projection, load_with};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use tempfile::TempDir;
 
@@ -173,8 +173,8 @@ pub fn load(path: &Path) -> Result<Scene> {
 
 /// Loads with options for normals and texture coordinates.
 pub fn load_vertices(path: &Path, normals: &str, uv: Option<Projection>) -> Scene {
-    let vertices = VertexOptions { normals: normals.parse().unwrap(), uv };
-    load_with(path.to_str().unwrap(), &LoadOptions { vertices, ..LoadOptions::default() }).unwrap()
+    let geometry = GeometryOptions { normals: normals.parse().unwrap(), uv, ..Default::default() };
+    load_with(path.to_str().unwrap(), &LoadOptions { geometry, ..LoadOptions::default() }).unwrap()
 }
 
 pub fn mesh(scene: &Scene, index: usize) -> &TriangleMesh {

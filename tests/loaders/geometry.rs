@@ -1,6 +1,6 @@
 //! Accessors, index types, modes, attributes.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde_json::json;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::load::{LoadOptions, load_with};
@@ -470,4 +470,38 @@ fn scenes_of_a_file() {
     assert!(error("3").contains("--gltf-scene 3: no such scene, but 0 `first`, 1 `second`"), "{}", error("3"));
     let other = load_with("builtin:atrium", &LoadOptions { scene: Some("0"), ..Default::default() });
     assert!(other.map(|_| ()).unwrap_err().to_string().contains("no glTF file"));
+}
+
+/// What points up along z is turned to y, with the cameras, lights and light from all around of the file.
+#[test]
+fn z_may_point_up() {
+    use skylit::scene::load::{GeometryOptions, UpAxis};
+    let options = |up| LoadOptions { geometry: GeometryOptions { up, ..Default::default() }, ..LoadOptions::default() };
+    let folder = Folder::new();
+    let path = folder.write("a.obj", "v 1 2 3\nv 2 2 3\nv 1 5 3\nf 1 2 3\n");
+    let scene = load_with(path.to_str().unwrap(), &options(UpAxis::Z)).unwrap();
+    let (lo, hi) = scene.bounds().unwrap();
+    assert!((lo - DVec3::new(1.0, 3.0, -5.0)).length() < 1e-12 && (hi - DVec3::new(2.0, 3.0, -2.0)).length() < 1e-12);
+    assert_eq!(scene.report.options, ["--up", "z"]);
+
+    // where everything is in the view of a camera does not change
+    for name in ["builtin:cornell-box", "builtin:stairs", "builtin:spheres:20"] {
+        let [before, after] = [UpAxis::Y, UpAxis::Z].map(|up| load_with(name, &options(up)).unwrap());
+        let seen = |scene: &Scene| {
+            let to_camera = scene.cameras[0].camera_to_world.inverse();
+            let instances = scene.instances.iter().map(|i| to_camera * i.object_to_world);
+            let lights = scene
+                .lights
+                .iter()
+                .flat_map(|l| [to_camera.transform_point3(l.position), to_camera.transform_vector3(l.direction)]);
+            (instances.collect::<Vec<_>>(), lights.collect::<Vec<_>>())
+        };
+        let (before, after) = (seen(&before), seen(&after));
+        assert!(before.0.iter().zip(&after.0).all(|(a, b)| a.abs_diff_eq(*b, 1e-9)), "{name}");
+        assert!(before.1.iter().zip(&after.1).all(|(a, b)| a.abs_diff_eq(*b, 1e-9)), "{name}");
+    }
+
+    // an animated file says itself where it is
+    let error = load_with("scenes/parade.glb", &options(UpAxis::Z)).unwrap_err().to_string();
+    assert!(error.contains("--up z: parade.glb is animated"), "{error}");
 }

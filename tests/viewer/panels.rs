@@ -6,7 +6,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
-use skylit::scene::load::{NormalSource, Projection, VertexOptions};
+use skylit::scene::load::{GeometryOptions, NormalSource, Projection};
 use skylit::settings::Length;
 use skylit::viewer::app::{App, Arrangement, Second};
 use skylit::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
@@ -34,7 +34,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
         scene: scene.map(str::to_owned),
         gltf_scene: None,
         confine: Default::default(),
-        vertices: Default::default(),
+        geometry: Default::default(),
         settings,
         device: Default::default(),
         size: [1000, 700],
@@ -736,10 +736,10 @@ fn normals_and_texture_coordinates_are_chosen() {
     };
     choose(&mut alone, "Normals", "flat");
     let request = alone.mailbox.peek();
-    assert_eq!((request.vertices.normals, request.load), (NormalSource::Flat, 2));
+    assert_eq!((request.geometry.normals, request.load), (NormalSource::Flat, 2));
     choose(&mut alone, "Texture coordinates", "box");
     let request = alone.mailbox.peek();
-    assert_eq!((request.vertices.uv, request.load), (Some(Projection::Box), 3));
+    assert_eq!((request.geometry.uv, request.load), (Some(Projection::Box), 3));
     let command = alone.harness.state().command().unwrap();
     assert!(command.contains(" --normals flat --uv box "), "{command}");
 
@@ -747,7 +747,7 @@ fn normals_and_texture_coordinates_are_chosen() {
     choose(&mut alone, "Normals", "file");
     choose(&mut alone, "Texture coordinates", "of the file");
     let request = alone.mailbox.peek();
-    assert_eq!((request.vertices, request.load), (VertexOptions::default(), 5));
+    assert_eq!((request.geometry, request.load), (GeometryOptions::default(), 5));
 }
 
 /// Play at the end starts anew; Space shows one image of two.

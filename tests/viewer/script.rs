@@ -13,7 +13,7 @@ fn options(scene: Option<&str>) -> ViewOptions {
         scene: scene.map(str::to_owned),
         gltf_scene: None,
         confine: Default::default(),
-        vertices: Default::default(),
+        geometry: Default::default(),
         settings: RenderSettings::default(),
         device: DeviceSettings::default(),
         size: [760, 520],

@@ -6,8 +6,8 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::options::VertexOptions;
-use super::{normals, ranges, tangents, vertices};
+use super::options::GeometryOptions;
+use super::{normals, orientation, ranges, tangents, vertices};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
 use crate::scene::MAX_COORDINATE;
@@ -24,7 +24,7 @@ const MAX_INVERSE: f64 = 1e30;
 
 /// Checks and repairs `scene`, which was read from `path`, and gives its meshes the normals and
 /// texture coordinates of `options`.
-pub(super) fn finish(scene: &mut Scene, path: &Path, options: VertexOptions, budget: &Budget) -> Result<()> {
+pub(super) fn finish(scene: &mut Scene, path: &Path, options: GeometryOptions, budget: &Budget) -> Result<()> {
     check(scene, path)?;
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
@@ -56,6 +56,7 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, options: VertexOptions, bud
         check(scene, path)?;
     }
     drop_empty(scene);
+    orientation::apply(scene, options.up)?;
     extent(scene, path)
 }
 

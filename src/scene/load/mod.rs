@@ -17,6 +17,7 @@ mod model;
 mod normals;
 mod obj;
 mod options;
+mod orientation;
 mod picture;
 mod projection;
 mod ranges;
@@ -34,7 +35,9 @@ use std::path::{Path, PathBuf};
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
-pub use options::{LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, VertexOptions, is_in_progress};
+pub use options::{
+    GeometryOptions, LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, UpAxis, is_in_progress,
+};
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;
@@ -81,7 +84,7 @@ fn load_any(source: &str, options: &LoadOptions) -> Result<Scene> {
     }
     if let Some(name) = source.strip_prefix("builtin:") {
         return match builtin::by_name(name) {
-            Some(scene) => with_vertices(scene, options),
+            Some(scene) => with_options(scene, options),
             None => Err(Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them"))),
         };
     }
@@ -89,7 +92,7 @@ fn load_any(source: &str, options: &LoadOptions) -> Result<Scene> {
     let extension = extension(path);
     if !FORMATS.contains(&extension.as_str()) && !path.is_file() {
         if let Some(scene) = builtin::by_name(source) {
-            return with_vertices(scene, options);
+            return with_options(scene, options);
         }
         if extension.is_empty() && !path.exists() {
             return Err(Error::input(
@@ -102,10 +105,10 @@ fn load_any(source: &str, options: &LoadOptions) -> Result<Scene> {
 }
 
 /// A built-in scene with the normals and texture coordinates of the options.
-fn with_vertices(mut scene: Scene, options: &LoadOptions) -> Result<Scene> {
-    if options.vertices != VertexOptions::default() {
+fn with_options(mut scene: Scene, options: &LoadOptions) -> Result<Scene> {
+    if options.geometry != GeometryOptions::default() {
         let name = scene.name.clone();
-        finish::finish(&mut scene, Path::new(&name), options.vertices, &Budget::default())?;
+        finish::finish(&mut scene, Path::new(&name), options.geometry, &Budget::default())?;
     }
     Ok(scene)
 }
@@ -146,7 +149,7 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     if let Some(chosen) = options.scene {
         scene.name = format!("{}, scene {chosen}", scene.name);
     }
-    finish::finish(&mut scene, path, options.vertices, &budget)?;
+    finish::finish(&mut scene, path, options.geometry, &budget)?;
     scene.report.warnings = warnings::bounded(std::mem::take(&mut scene.report.warnings));
     Ok(scene)
 }

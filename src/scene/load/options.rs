@@ -21,6 +21,16 @@ choices! {
     }
 }
 
+choices! {
+    /// The axis of a file that points up. It becomes y, which is up everywhere else.
+    pub enum UpAxis (default Y) {
+        /// As in glTF
+        Y = "y",
+        /// As in files of CAD programs, robots and maps
+        Z = "z",
+    }
+}
+
 /// Where the shading normals of meshes come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum NormalSource {
@@ -61,23 +71,27 @@ impl FromStr for NormalSource {
     }
 }
 
-/// Attributes of vertices that replace the file's, or that it lacks.
+/// How the geometry of a file is understood, and attributes of vertices that replace the file's, or
+/// that it lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct VertexOptions {
+pub struct GeometryOptions {
     /// Shading normals.
     pub normals: NormalSource,
     /// Texture coordinates of meshes that have none and whose material has textures; `None`: zero,
     /// with a warning.
     pub uv: Option<Projection>,
+    /// The axis that points up.
+    pub up: UpAxis,
 }
 
-impl VertexOptions {
+impl GeometryOptions {
     /// The options as words of the command line: `--normals`, `flat`, ...; none of the defaults.
     pub fn flags(&self) -> Vec<String> {
         let normals = Some(self.normals).filter(|n| *n != NormalSource::File);
         let normals = normals.map(|normals| ["--normals".to_owned(), normals.to_string()]);
         let uv = self.uv.map(|projection| ["--uv".to_owned(), projection.to_string()]);
-        normals.into_iter().chain(uv).flatten().collect()
+        let up = Some(self.up).filter(|up| *up != UpAxis::Y).map(|up| ["--up".to_owned(), up.to_string()]);
+        normals.into_iter().chain(uv).chain(up).flatten().collect()
     }
 }
 
@@ -96,15 +110,15 @@ pub struct LoadOptions<'a> {
     /// that the file names, or else its first.
     pub scene: Option<&'a str>,
     /// Normals and texture coordinates, also of built-in scenes.
-    pub vertices: VertexOptions,
+    pub geometry: GeometryOptions,
 }
 
 impl LoadOptions<'_> {
     /// The options that decide what is loaded, as words of the command line: `--gltf-scene`,
-    /// `--normals`, `--uv`; none of the defaults.
+    /// `--normals`, `--uv`, `--up`; none of the defaults.
     pub fn flags(&self) -> Vec<String> {
         let scene = self.scene.map(|scene| ["--gltf-scene".to_owned(), scene.to_owned()]);
-        scene.into_iter().flatten().chain(self.vertices.flags()).collect()
+        scene.into_iter().flatten().chain(self.geometry.flags()).collect()
     }
 }
 
@@ -135,7 +149,7 @@ impl Default for LoadOptions<'_> {
             progress: &|_| (),
             confine: Confine::Nowhere,
             scene: None,
-            vertices: VertexOptions::default(),
+            geometry: GeometryOptions::default(),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-use super::options::{NormalSource, VertexOptions};
+use super::options::{GeometryOptions, NormalSource};
 use super::projection::project;
 use super::smoothing::smooth;
 use super::split::drop_tangents;
@@ -30,8 +30,8 @@ type Part<'a> = (&'a mut TriangleMesh, Option<&'a mut Deformation>);
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`] where that takes more memory than the budget has.
-pub(super) fn apply(scene: &mut Scene, options: VertexOptions, budget: &Budget) -> Result<()> {
-    if options == VertexOptions::default() {
+pub(super) fn apply(scene: &mut Scene, options: GeometryOptions, budget: &Budget) -> Result<()> {
+    if options == GeometryOptions::default() {
         return Ok(());
     }
     let corners = |g: &Geometry| if let Geometry::Triangles(t) = g { 3 * t.indices.len() as u64 } else { 0 };

@@ -6,7 +6,7 @@ use super::{editor, performance};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::Camera;
 use crate::scene::environments::BuiltinEnvironment;
-use crate::scene::load::{NormalSource, Projection, VertexOptions};
+use crate::scene::load::{GeometryOptions, NormalSource, Projection, UpAxis};
 use crate::scene::settings::variant_index;
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
@@ -34,7 +34,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
         editor::edit(ui, settings, &serde_json::json!({ "mtl_dissolve": "alpha" }));
         variant(app, ui);
         scene_of_file(app, ui);
-        vertices(app, ui);
+        geometry(app, ui);
     });
     section(ui, "Light", false, |ui| light(app, ui));
     section(ui, "Camera", false, |ui| camera(app, ui));
@@ -540,10 +540,21 @@ fn scene_of_file(app: &mut App, ui: &mut Ui) {
     }
 }
 
-/// Normals and texture coordinates that replace the file's, for which it is loaded anew.
-fn vertices(app: &mut App, ui: &mut Ui) {
+/// Axis, normals and texture coordinates in place of the file's, for which it is loaded anew.
+fn geometry(app: &mut App, ui: &mut Ui) {
     let mut is_editing = false;
-    let VertexOptions { normals, uv } = &mut app.vertices;
+    let GeometryOptions { normals, uv, up } = &mut app.geometry;
+
+    // the axis that points up
+    ui.horizontal(|ui| {
+        let heading = ui.label("Up");
+        let list = ComboBox::from_id_salt("up").selected_text(up.name()).show_ui(ui, |ui| {
+            for axis in UpAxis::ALL {
+                ui.selectable_value(up, axis, axis.name()).on_hover_text(axis.help());
+            }
+        });
+        list.response.labelled_by(heading.id).on_hover_text("Axis of the file that points up\n--up");
+    });
 
     // normals, and the angle of edges that stay sharp
     let angle = if let NormalSource::Smooth(degrees) = *normals { degrees } else { 180.0 };
@@ -583,7 +594,7 @@ fn vertices(app: &mut App, ui: &mut Ui) {
         response.response.labelled_by(heading.id).on_hover_text(help);
     });
     // not for each value that is passed on the way
-    if app.vertices != app.opened_vertices() && !is_editing {
+    if app.geometry != app.opened_geometry() && !is_editing {
         app.reload();
     }
 }

@@ -172,7 +172,7 @@ impl Worker {
         request: &Request,
         device: Option<Arc<Device>>,
     ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
-        let options = LoadOptions { vertices: request.vertices, ..self.load };
+        let options = LoadOptions { geometry: request.geometry, ..self.load };
         let mut loader = Loader::start(source, request.gltf_scene.as_deref(), options, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),

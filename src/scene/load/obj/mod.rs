@@ -61,7 +61,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
 
     // meshes
     let origin = origin(&file);
-    if loading.options.vertices.normals == NormalSource::File {
+    if loading.options.geometry.normals == NormalSource::File {
         scene.report.normals_computed += smooth::smooth(&mut file);
     } else {
         // the file's would only split vertices
