@@ -41,7 +41,7 @@ pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Image to write: .exr (all channels, metadata), .png, .jpg, .webp (lossless); frames in real time also .apng, .mp4, .webm, .gif; may be given more than once
+    /// Image to write: .exr (all channels), .png, .jpg or .webp; of frames in real time also .apng, .mp4, .webm or .gif; may be repeated
     #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Write the image so far on Ctrl-C, too (the exit code is still 130)
