@@ -113,11 +113,7 @@ impl Renderer {
         let settling = || {
             Realtime::frames_for(&realtime_settings, size, is_radiance, is_cpu, frames_of_history(&realtime_settings))
         };
-        // frames of an orbit have no beginning, others begin with frame 0
-        let plays = timeline.animation().is_some() && timeline.time.is_none() || timeline.camera_path.is_some();
-        let lead_in = timeline.lead_in.unwrap_or(0).min(if plays { range.first } else { u32::MAX });
-        let warm_up =
-            timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 || lead_in > 0 { 0 } else { settling() });
+        let (warm_up, lead_in) = frames_before(timeline, settling);
         let samples = (u64::from(range.end - range.first) + u64::from(warm_up) + u64::from(lead_in))
             .saturating_mul(u64::from(size[0]) * u64::from(size[1]));
         let rays_per_sample = if is_radiance { integrator.get().rays_per_sample() } else { 1 };
@@ -153,9 +149,7 @@ impl Renderer {
             brightness: None,
             seconds: Seconds::default(),
         };
-        let mut metadata = frame_metadata(&report, options.as_ref());
-        metadata.extend(chosen.map(|options| (CHOSEN, options)));
-        metadata.extend(report.setup.scene_options.clone().map(|options| (SCENE_OPTIONS, options)));
+        let metadata = frame_metadata(&report, options.as_ref(), chosen);
 
         // Keep the pipelines for later calls.
         self.pipelines = self.device.live_pipelines();
@@ -182,6 +176,17 @@ impl Renderer {
             metadata,
         })
     }
+}
+
+/// Numbers of frames before the first: those of one view, and those of the sequence. `settling`: how
+/// many fill the histories of a single frame.
+fn frames_before(timeline: &FrameSettings, settling: impl FnOnce() -> u32) -> (u32, u32) {
+    let range = timeline.range();
+    // frames of an orbit have no beginning, others begin with frame 0
+    let plays = timeline.animation().is_some() && timeline.time.is_none() || timeline.camera_path.is_some();
+    let lead_in = timeline.lead_in.unwrap_or(0).min(if plays { range.first } else { u32::MAX });
+    let is_single = range.end - range.first == 1 && lead_in == 0;
+    (timeline.warm_up.unwrap_or_else(|| if is_single { settling() } else { 0 }), lead_in)
 }
 
 impl Frames<'_> {
@@ -404,8 +409,13 @@ pub fn frame_streams(settings: &RenderSettings, realtime_settings: &Settings) ->
     }
 }
 
-/// Metadata of the images of frames. `options`: those of frames of radiance.
-fn frame_metadata(report: &FramesReport, options: Option<&PathOptions>) -> Vec<(&'static str, String)> {
+/// Metadata of the images of frames. `options`: those of frames of radiance; `chosen`: options for
+/// what was chosen.
+fn frame_metadata(
+    report: &FramesReport,
+    options: Option<&PathOptions>,
+    chosen: Option<String>,
+) -> Vec<(&'static str, String)> {
     let FramesReport { setup, settings, .. } = report;
     let mut metadata: Vec<_> = match options {
         Some(options) => {
@@ -433,6 +443,8 @@ fn frame_metadata(report: &FramesReport, options: Option<&PathOptions>) -> Vec<(
         ("tracer", setup.tracer.to_string()),
         ("version", env!("CARGO_PKG_VERSION").into()),
     ]);
+    metadata.extend(chosen.map(|options| (CHOSEN, options)));
+    metadata.extend(setup.scene_options.clone().map(|options| (SCENE_OPTIONS, options)));
     metadata
 }
 

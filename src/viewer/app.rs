@@ -747,6 +747,23 @@ impl App {
         self.chosen_truth = truth.map(|truth| (self.first.integrator(), truth));
     }
 
+    /// Settings of the truth that an image of these settings is compared with.
+    fn truth_settings(&self, first: &RenderSettings) -> RenderSettings {
+        let mut truth = self.truth().settings(&self.settings);
+        // samples of its own: of the same ones a truth of the same integrator would be the same image
+        truth.image.seed = Some(truth.seed().wrapping_add(TRUTH_SEED));
+        if first.realtime_setting().is_some() {
+            // what differs shall not be the samples' place in the pixel
+            let is_antialiased = frame_settings(first).is_ok_and(|s| s.antialias);
+            if truth.realtime_setting().is_some() {
+                truth.frames.antialias = Some(if is_antialiased { Antialias::On } else { Antialias::Off });
+            } else if !is_antialiased {
+                truth.image.pixel_filter = Some(PixelFilter::Centre);
+            }
+        }
+        truth
+    }
+
     /// Sends what has changed.
     fn send(&mut self) {
         // images on the screen, then the truth if something is compared with it
@@ -756,20 +773,7 @@ impl App {
         }
         let shown = panes.len();
         if self.compares_now() {
-            let mut truth = self.truth().settings(&self.settings);
-            // samples of its own: of the same ones a truth of the same integrator would be the same
-            // image
-            truth.image.seed = Some(truth.seed().wrapping_add(TRUTH_SEED));
-            if panes[0].realtime_setting().is_some() {
-                // what differs shall not be the samples' place in the pixel
-                let is_antialiased = frame_settings(&panes[0]).is_ok_and(|s| s.antialias);
-                if truth.realtime_setting().is_some() {
-                    truth.frames.antialias = Some(if is_antialiased { Antialias::On } else { Antialias::Off });
-                } else if !is_antialiased {
-                    truth.image.pixel_filter = Some(PixelFilter::Centre);
-                }
-            }
-            panes.push(truth);
+            panes.push(self.truth_settings(&panes[0]));
         }
 
         // a request like the last one changes nothing
