@@ -157,8 +157,8 @@ if cargo nextest --version >/dev/null 2>&1; then
   for binary in "${shared[@]}"; do
     if [ "$binary$filter" = path ]; then
       # half of the time of this binary is in these subjects: two processes, since its tests wait for each other
-      enqueue default path cli:: film:: frames:: lag::
-      enqueue default path --skip cli:: --skip film:: --skip frames:: --skip lag::
+      enqueue default path bsdf:: cli:: film:: frames:: lag::
+      enqueue default path --skip bsdf:: --skip cli:: --skip film:: --skip frames:: --skip lag::
     else
       # shellcheck disable=SC2086
       enqueue default "$binary" $filter

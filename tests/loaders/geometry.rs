@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde_json::json;
+use skylit::scene::Scene;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::load::{LoadOptions, load_with};
 
