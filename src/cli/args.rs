@@ -29,7 +29,7 @@ pub struct LoadArgs {
     pub uv: Option<Projection>,
     /// Axis of the file that points up: z in files of CAD programs, robots and maps [default: y]
     #[arg(long, value_enum, value_name = "y|z", help_heading = "Scene", hide_short_help = true)]
-    pub up: Option<UpAxis>,
+    pub up_axis: Option<UpAxis>,
     /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
     ///
     /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
@@ -58,7 +58,7 @@ impl LoadArgs {
 
     /// How the options understand the geometry.
     pub fn geometry(&self) -> GeometryOptions {
-        let (normals, up) = (self.normals.unwrap_or_default(), self.up.unwrap_or_default());
+        let (normals, up) = (self.normals.unwrap_or_default(), self.up_axis.unwrap_or_default());
         GeometryOptions { normals, uv: self.uv, up }
     }
 

@@ -178,8 +178,8 @@ impl Renderer {
     }
 }
 
-/// Numbers of frames before the first: those of one view, and those of the sequence. `settling`: how
-/// many fill the histories of a single frame.
+/// Numbers of frames before the first: those of one view, and those of the sequence. `settling`:
+/// how many fill the histories of a single frame.
 fn frames_before(timeline: &FrameSettings, settling: impl FnOnce() -> u32) -> (u32, u32) {
     let range = timeline.range();
     // frames of an orbit have no beginning, others begin with frame 0

@@ -141,7 +141,7 @@ struct Entry {
     gltf_scene: Option<Spanned<String>>,
     normals: Option<Spanned<Normals>>,
     uv: Option<Spanned<String>>,
-    up: Option<Spanned<String>>,
+    up_axis: Option<Spanned<String>>,
     render: Option<Spanned<String>>,
     settings: Option<Spanned<PathBuf>>,
     tracers: Option<Spanned<Vec<String>>>,
@@ -401,9 +401,9 @@ fn geometry(source: &Source, entry: &Entry) -> Result<GeometryOptions> {
         let unknown = || source.error(uv.span(), format!("uv = {}: one of {} expected", uv.get_ref(), names()));
         geometry.uv = Some(projection.ok_or_else(unknown)?);
     }
-    if let Some(up) = &entry.up {
+    if let Some(up) = &entry.up_axis {
         let axis = UpAxis::ALL.into_iter().find(|axis| axis.name() == up.get_ref());
-        let unknown = || source.error(up.span(), format!("up = {}: y or z expected", up.get_ref()));
+        let unknown = || source.error(up.span(), format!("up_axis = {}: y or z expected", up.get_ref()));
         geometry.up = axis.ok_or_else(unknown)?;
     }
     Ok(geometry)
@@ -578,7 +578,7 @@ mod tests {
         for (keys, options) in [
             ("normals = \"flat\"", "--normals flat "),
             ("normals = \"smooth\", uv = \"box\"", "--normals smooth --uv box "),
-            ("up = \"z\"", "--up z "),
+            ("up_axis = \"z\"", "--up-axis z "),
             ("normals = 30", "--normals 30 "),
             ("normals = 30.5", "--normals 30.5 "),
             ("normals = \"file\"", "--integrator ao "),
@@ -589,7 +589,7 @@ mod tests {
         for (keys, why) in [
             ("normals = \"round\"", "line 1: normals = round: file, flat, smooth or an angle from 0 to 180 degrees"),
             ("normals = 181", "line 1: normals = 181: file, flat"),
-            ("up = \"x\"", "line 1: up = x: y or z expected"),
+            ("up_axis = \"x\"", "line 1: up_axis = x: y or z expected"),
             ("uv = \"planar\"", "line 1: uv = planar: one of spherical, cylindrical, box expected"),
         ] {
             let problem = frame(keys).unwrap().problem.unwrap();

@@ -750,7 +750,8 @@ impl App {
     /// Settings of the truth that an image of these settings is compared with.
     fn truth_settings(&self, first: &RenderSettings) -> RenderSettings {
         let mut truth = self.truth().settings(&self.settings);
-        // samples of its own: of the same ones a truth of the same integrator would be the same image
+        // samples of its own: of the same ones a truth of the same integrator would be the same
+        // image
         truth.image.seed = Some(truth.seed().wrapping_add(TRUTH_SEED));
         if first.realtime_setting().is_some() {
             // what differs shall not be the samples' place in the pixel
@@ -1036,7 +1037,7 @@ impl App {
         self.default_frame_rate
     }
 
-    /// What a render is asked for unless the user says otherwise: the size of the window.
+    /// Numbers of a render unless the user says otherwise: the size is that of the window.
     pub fn default_render(&self, motion: RenderedMotion) -> RenderWanted {
         RenderWanted {
             motion,

@@ -15,7 +15,7 @@ pub enum Dialog {
     Render(String, RenderWanted),
 }
 
-/// What is asked of `skylit render`. Of each motion it has the numbers that apply to it.
+/// Numbers that `skylit render` is asked for. Of each motion it has the numbers that apply to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderWanted {
     pub motion: RenderedMotion,

@@ -20,7 +20,7 @@ pub struct Render {
     is_cancelled: bool,
 }
 
-/// What the program has said.
+/// The lines that the program has printed, as far as they count.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Heard {
     /// Share that is done, and the rest of the line about it: how long, how much longer.
@@ -34,7 +34,7 @@ impl Heard {
     fn take(&mut self, line: &str) {
         let percent = line.split_once(" % after ").and_then(|(before, rest)| {
             let percent = before.rsplit(' ').next()?.parse::<f32>().ok()?;
-            Some((0.01 * percent, format!("after {rest}")))
+            Some((percent / 100.0, format!("after {rest}")))
         });
         match percent {
             Some(progress) => self.progress = Some(progress),

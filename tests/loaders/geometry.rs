@@ -483,7 +483,7 @@ fn z_may_point_up() {
     let scene = load_with(path.to_str().unwrap(), &options(UpAxis::Z)).unwrap();
     let (lo, hi) = scene.bounds().unwrap();
     assert!((lo - DVec3::new(1.0, 3.0, -5.0)).length() < 1e-12 && (hi - DVec3::new(2.0, 3.0, -2.0)).length() < 1e-12);
-    assert_eq!(scene.report.options, ["--up", "z"]);
+    assert_eq!(scene.report.options, ["--up-axis", "z"]);
 
     // where everything is in the view of a camera does not change
     for name in ["builtin:cornell-box", "builtin:stairs", "builtin:spheres:20"] {
@@ -504,5 +504,5 @@ fn z_may_point_up() {
 
     // an animated file says itself where it is
     let error = load_with("scenes/parade.glb", &options(UpAxis::Z)).unwrap_err().to_string();
-    assert!(error.contains("--up z: parade.glb is animated"), "{error}");
+    assert!(error.contains("--up-axis z: parade.glb is animated"), "{error}");
 }

@@ -90,7 +90,7 @@ impl GeometryOptions {
         let normals = Some(self.normals).filter(|n| *n != NormalSource::File);
         let normals = normals.map(|normals| ["--normals".to_owned(), normals.to_string()]);
         let uv = self.uv.map(|projection| ["--uv".to_owned(), projection.to_string()]);
-        let up = Some(self.up).filter(|up| *up != UpAxis::Y).map(|up| ["--up".to_owned(), up.to_string()]);
+        let up = Some(self.up).filter(|up| *up != UpAxis::Y).map(|up| ["--up-axis".to_owned(), up.to_string()]);
         normals.into_iter().chain(uv).chain(up).flatten().collect()
     }
 }
@@ -115,7 +115,7 @@ pub struct LoadOptions<'a> {
 
 impl LoadOptions<'_> {
     /// The options that decide what is loaded, as words of the command line: `--gltf-scene`,
-    /// `--normals`, `--uv`, `--up`; none of the defaults.
+    /// `--normals`, `--uv`, `--up-axis`; none of the defaults.
     pub fn flags(&self) -> Vec<String> {
         let scene = self.scene.map(|scene| ["--gltf-scene".to_owned(), scene.to_owned()]);
         scene.into_iter().flatten().chain(self.geometry.flags()).collect()

@@ -17,7 +17,7 @@ pub(super) fn apply(scene: &mut Scene, up: UpAxis) -> Result<()> {
         UpAxis::Z => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
     };
     if scene.rig.is_some() {
-        return Err(Error::Usage(format!("--up {up}: {} is animated, and +y is up in such files", scene.name)));
+        return Err(Error::Usage(format!("--up-axis {up}: {} is animated, and +y is up in such files", scene.name)));
     }
     let to_world = DAffine3::from_mat3(turn);
     for instance in &mut scene.instances {

@@ -553,7 +553,7 @@ fn geometry(app: &mut App, ui: &mut Ui) {
                 ui.selectable_value(up, axis, axis.name()).on_hover_text(axis.help());
             }
         });
-        list.response.labelled_by(heading.id).on_hover_text("Axis of the file that points up\n--up");
+        list.response.labelled_by(heading.id).on_hover_text("Axis of the file that points up\n--up-axis");
     });
 
     // normals, and the angle of edges that stay sharp
