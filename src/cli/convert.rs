@@ -8,14 +8,13 @@ use serde_json::json;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
+use crate::interface::ToneMap;
 use crate::memory::Budget;
 use crate::output::settings::Background;
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, layers, picture};
 use crate::renderer::brightness;
 use crate::settings::parse::parse_number;
 use crate::terminal::console::{Failure, Verbosity};
-
-pub use crate::interface::ToneMap;
 
 const EXAMPLES: &str = "Examples:
   skylit convert image.exr image.png --tone-map agx --exposure 1
@@ -36,7 +35,7 @@ pub struct ConvertArgs {
     /// Layer to show in place of the colours: `albedo`, `Ns`, `depth`, or a channel such as `Ng.X`
     #[arg(long, value_name = "NAME")]
     pub layer: Option<String>,
-    /// Values that become 0 and 1; `auto` is the least and the greatest [default: auto for a layer of one channel, -1,1 for directions, else 0,1]
+    /// Values that become 0 and 1; `auto` is the least and the greatest [default: in pictures auto for a layer of one channel, -1,1 for directions, else 0,1]
     #[arg(long, value_name = "LEAST,GREATEST|auto", value_parser = Range::parse, allow_hyphen_values = true)]
     pub range: Option<Range>,
     /// Tone mapping operator of pictures; an .exr stays linear [default: linear]
@@ -116,15 +115,30 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
         None if args.layer.is_some() => layers::default_range(&image, &channels),
         None => None,
     };
-    let image = range.map_or(image.clone(), |range| layers::stretched(image, range));
+
+    // an .exr holds any value: it keeps those that no option changes
+    let is_picture = |path: &PathBuf| ImageFormat::from_path(path).is_ok_and(ImageFormat::is_picture);
+    if args.range.is_none() {
+        for path in args.outputs.iter().filter(|path| !is_picture(path)) {
+            write(args, &image, 0.0, path)?;
+        }
+    }
+    let image = match range {
+        Some(range) => layers::stretched(image, range),
+        None => image,
+    };
 
     // what pictures show of it
-    let has_picture = args.outputs.iter().any(|path| ImageFormat::from_path(path).is_ok_and(ImageFormat::is_picture));
+    let has_picture = args.outputs.iter().any(is_picture);
     let exposure = if has_picture { exposure_of(args, &image)? } else { 0.0 };
     for path in &args.outputs {
-        write(args, &image, exposure, path)?;
-        let shown = range.map_or(String::new(), |[a, b]| format!(", {a} to {b} as 0 to 1"));
-        let stops = if exposure != 0.0 { format!(", {exposure:+} stops") } else { String::new() };
+        let is_kept = !is_picture(path) && args.range.is_none();
+        if !is_kept {
+            write(args, &image, exposure, path)?;
+        }
+        let shown = range.filter(|_| !is_kept).map_or(String::new(), |[a, b]| format!(", {a} to {b} as 0 to 1"));
+        let has_stops = exposure != 0.0 && is_picture(path);
+        let stops = if has_stops { format!(", {exposure:+} stops") } else { String::new() };
         console.line(&format!("{}: {}x{}{shown}{stops}", path.display(), image.width, image.height))?;
     }
     Ok(console.record(&json!({

@@ -23,21 +23,26 @@ pub fn names(image: &Image) -> Vec<&str> {
     names
 }
 
+/// The channels of a layer, or the channel of that name, in the order in which people count them:
+/// red before green, x before y.
+pub fn channels<'a>(image: &'a Image, name: &str) -> Vec<&'a Channel> {
+    let is_named = |channel: &&Channel| channel.name == name || layer_of(&channel.name) == name;
+    let place = |c: &Channel| "RXUGYVBZW".find(c.name.rsplit('.').next().unwrap_or_default()).unwrap_or(usize::MAX);
+    let mut found: Vec<&Channel> = image.channels.iter().filter(is_named).collect();
+    found.sort_by_key(|c| place(c));
+    found
+}
+
 /// A layer or channel as an image of its own: `R`, `G`, `B` of three channels, `Y` of one; with the
 /// alpha of the image. And the names that its channels had.
 ///
 /// # Errors
 /// Why there is none of that name, as the end of a sentence.
 pub fn layer(image: &Image, name: &str) -> Result<(Image, Vec<String>), String> {
-    let is_named = |channel: &&Channel| channel.name == name || layer_of(&channel.name) == name;
-    let mut found: Vec<&Channel> = image.channels.iter().filter(is_named).collect();
+    let found = channels(image, name);
     if found.is_empty() {
         return Err(format!("has no layer {name:?}: it has {}", names(image).join(", ")));
     }
-
-    // in the order in which people count them, which is not that of a file
-    let place = |c: &Channel| "RXUGYVBZW".find(c.name.rsplit('.').next().unwrap_or_default()).unwrap_or(usize::MAX);
-    found.sort_by_key(|c| place(c));
     let old_names: Vec<String> = found.iter().map(|c| c.name.clone()).collect();
     let new_names: &[&str] = match found.len() {
         1 => &["Y"],

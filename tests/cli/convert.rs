@@ -94,8 +94,14 @@ fn layers_are_images_of_their_own() {
     let [png, exr] = ["a.png", "a.exr"].map(|n| place(&dir, n));
 
     // one channel: from the least to the greatest value of surfaces, or between two that are named
-    let text = converts(&[&image, &exr, "--layer", "depth"]);
-    assert!(text.contains("8 to 31 as 0 to 1"), "{text}");
+    let text = converts(&[&image, &png, &exr, "--layer", "depth", "--png-bits", "16", "--png-encoding", "linear"]);
+    assert!(text.lines().next().unwrap().contains("8 to 31 as 0 to 1"), "{text}");
+    let shown = values(&png, "Y");
+    assert_eq!([shown[8], shown[31]], [0.0, 1.0]);
+    // an .exr has the values themselves, unless a range is given
+    let depths = values(&exr, "Y");
+    assert_eq!([depths[8], depths[31]], [8.0, 31.0]);
+    converts(&[&image, &exr, "--layer", "depth", "--range", "auto"]);
     let depths = values(&exr, "Y");
     assert_eq!([depths[8], depths[31]], [0.0, 1.0]);
     converts(&[&image, &exr, "--layer", "depth.Z", "--range", "31,7"]);

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::interface::ToneMap;
 use crate::measure::comparison::{self, CompareOptions, Comparison};
 use crate::memory::Budget;
-use crate::output::{self, Image};
+use crate::output::{self, Channel, Image, Samples};
 use crate::renderer::interactive::ViewPicture;
 
 /// Content of the picture.
@@ -170,17 +170,18 @@ impl Images {
     pub fn values(&self, index: usize) -> Option<String> {
         let image = &self.images.get(index)?.image;
         let [x, y] = self.pixel.filter(|p| p[0] < image.width && p[1] < image.height)?;
-        let layer;
-        let image = if self.look.layer.is_empty() {
-            image
-        } else {
-            layer = output::layers::layer(image, &self.look.layer).ok()?.0;
-            &layer
-        };
         let at = y as usize * image.width as usize + x as usize;
-        let names = ["R", "G", "B", "Y", "A"].into_iter().filter(|n| *n != "Y" || image.f32("R").is_none());
-        let values = names.filter_map(|name| Some(format!("{name} {:.5}", image.f32(name)?[at])));
-        Some(values.collect::<Vec<_>>().join("  "))
+        let value = |channel: &Channel| match &channel.samples {
+            Samples::F32(values) => format!("{} {:.5}", channel.name, values[at]),
+            Samples::U32(numbers) => format!("{} {}", channel.name, numbers[at]),
+        };
+        let values: Vec<String> = if self.look.layer.is_empty() {
+            let names = ["R", "G", "B", "Y", "A"].into_iter().filter(|n| *n != "Y" || image.f32("R").is_none());
+            names.filter_map(|name| image.channels.iter().find(|c| c.name == name)).map(value).collect()
+        } else {
+            output::layers::channels(image, &self.look.layer).into_iter().map(value).collect()
+        };
+        Some(values.join("  "))
     }
 
     /// Runs a frame of the user interface.

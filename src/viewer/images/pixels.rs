@@ -41,7 +41,10 @@ impl Display {
         } else {
             let (layer, names) = output::layers::layer(image, &look.layer)?;
             let range = output::layers::default_range(&layer, &names);
-            stretched = range.map_or(layer.clone(), |range| output::layers::stretched(layer, range));
+            stretched = match range {
+                Some(range) => output::layers::stretched(layer, range),
+                None => layer,
+            };
             &stretched
         };
         let planes = output::layers::colour_planes(image).ok_or("the image has no colours")?;
