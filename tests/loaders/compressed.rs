@@ -538,6 +538,7 @@ fn dds_that_are_refused() {
         (dds_9([5, 6], *b"DXT1", &red), "ends early"),
         (dds_9([16384, 16384], *b"DXT5", &red), "ends early"),
         (dds_9([4, 4], *b"DXT1", &red)[..100].to_vec(), "ends early"),
+        (dds_9([4, 4], *b"DXT1", &red)[..120].to_vec(), "ends early"),
         (dds_10([1, 1], [29, 3, 0, 1], &[])[..140].to_vec(), "ends early"),
         (dds_9([40_000, 1], *b"DXT1", &red), "40000x1 pixels"),
         (dds_9([0, 4], *b"DXT1", &red), "0x4 pixels"),

@@ -68,7 +68,7 @@ fn decode_file(bytes: &[u8], budget: &Budget) -> Result<DecodedImage, String> {
         return Err("is a cube map or a volume, not an image".to_owned());
     }
     let (layout, start) = layout(bytes)?;
-    let data = &bytes[start..];
+    let data = bytes.get(start..).unwrap_or_default();
 
     // a file that is too short is known before anything is allocated
     let pixels = width as usize * height as usize;
