@@ -82,11 +82,15 @@ impl Bvh2 {
         if boxes.is_empty() {
             return Self { root: EMPTY, ..Default::default() };
         }
-        Self::lay_out(build::tree(boxes, preset, Some(max_leaf.clamp(1, MAX_LEAF))))
+        Self::from_tree(build::tree(boxes, preset, Some(max_leaf.clamp(1, MAX_LEAF))))
     }
 
-    /// Lays a tree out depth first.
-    fn lay_out(tree: obvhs::bvh2::Bvh2) -> Self {
+    /// Lays a tree out depth first. Its leaves hold at most [`MAX_LEAF`] primitives; one without
+    /// nodes is empty.
+    pub fn from_tree(tree: obvhs::bvh2::Bvh2) -> Self {
+        if tree.nodes.is_empty() {
+            return Self { root: EMPTY, ..Default::default() };
+        }
         let mut out =
             Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
         // what to emit, its depth, and the node and side that will refer to it

@@ -6,6 +6,7 @@ pub mod cache;
 pub mod clip;
 pub mod features;
 pub mod flatten;
+pub mod lab;
 pub mod pairs;
 pub mod refit;
 mod reinsert;

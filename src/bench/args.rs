@@ -2,6 +2,7 @@
 
 use clap::{Args, Subcommand};
 
+use super::builders::BenchBuildersArgs;
 use super::frames::BenchFramesArgs;
 use super::path::BenchPathArgs;
 use super::rays::BenchRaysArgs;
@@ -26,6 +27,8 @@ pub enum Benchmark {
     Frames(Box<BenchFramesArgs>),
     /// Path tracing: error over time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
+    /// Builders of hierarchies: what rays cost in trees that were built for them, in visits and rates, beside the results of Falcone (2024)
+    Builders(Box<BenchBuildersArgs>),
     /// Show, plot and compare saved JSON records of the benchmarks without measuring anything
     Report(BenchReportArgs),
 }

@@ -1,12 +1,13 @@
 //! `skylit bench`: speed of tracers, frames in real time and path tracing, beside those of others.
 //!
-//! Each benchmark is a folder: `rays`, `frames`, `path`. All make the measurements of `record`,
-//! which `table`, `chart` and `page` show, `baseline` compares with an earlier run, and `report`
-//! shows again. `peers` runs the programs of others, `scenes` knows well-known scenes, `session` is
-//! a run under way, and `device` alone opens the device and builds tracers.
+//! Each benchmark is a folder: `rays`, `frames`, `path`, `builders`. All make the measurements of
+//! `record`, which `table`, `chart` and `page` show, `baseline` compares with an earlier run, and
+//! `report` shows again. `peers` runs the programs of others, `scenes` knows well-known scenes,
+//! `session` is a run under way, and `device` alone opens the device and builds tracers.
 
 mod args;
 mod baseline;
+mod builders;
 mod chart;
 mod common;
 mod device;
@@ -33,6 +34,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         args::Benchmark::Ao(args) => frames::run(&args.of_ambient_occlusion()),
         args::Benchmark::Path(args) => path::run(args),
         args::Benchmark::Frames(args) => frames::run(args),
+        args::Benchmark::Builders(args) => builders::run(args),
         args::Benchmark::Report(args) => report::run(args),
     }
 }

@@ -48,6 +48,7 @@ fn title(kind: BenchKind) -> &'static str {
         BenchKind::Rays => "Ray tracing",
         BenchKind::Path => "Path tracing",
         BenchKind::Frames => "Frames in real time",
+        BenchKind::Builders => "Builders of hierarchies",
     }
 }
 
@@ -56,6 +57,7 @@ fn summary(reported: &[ReportedRecord]) -> String {
     let question = |r: &ReportedRecord| match r.record.benchmark {
         BenchKind::Rays => "How many rays a second each tracer traces.",
         BenchKind::Path => "How the error of path-traced images falls with time.",
+        BenchKind::Builders => "What rays cost in trees that were built for them.",
         BenchKind::Frames => {
             "What a frame of each preset costs, and how far it is from converged images, beside plain accumulation at equal time."
         }

@@ -62,4 +62,6 @@ pub const CAMERA_RAYS: Quantity = plain("camera rays", "");
 /// Differences of consecutive frames.
 pub const FLICKER: Quantity = less("flicker", "");
 pub const BYTES: Quantity = less("bytes a primitive", "");
+/// Cost of a ray by its visits: 2.0 an inner node, 1.2 a primitive.
+pub const RAY_COST: Quantity = less("cost", "");
 pub const NODES: Quantity = less("nodes a ray", "");

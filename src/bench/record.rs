@@ -24,6 +24,7 @@ pub enum BenchKind {
     Rays,
     Frames,
     Path,
+    Builders,
 }
 
 impl BenchKind {
@@ -33,6 +34,7 @@ impl BenchKind {
             Self::Rays => "rays",
             Self::Frames => "frames",
             Self::Path => "path",
+            Self::Builders => "builders",
         }
     }
 }

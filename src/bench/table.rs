@@ -1,7 +1,7 @@
 //! Measurements as tables, one for each part of a scene, with a row a contestant.
 
 use super::chart::distinct;
-use super::record::{Measurement, Record};
+use super::record::{BenchKind, Measurement, Record};
 use crate::measure::regression::Values;
 use crate::report::{Cell, Part, Row, Table, format_number};
 
@@ -14,8 +14,11 @@ const MAX_PLACES: usize = 8;
 pub fn title(record: &Record) -> String {
     let settings = record.settings.iter().map(|(name, value)| format!(", {name} {value}")).collect::<String>();
     let peers = record.peers.iter().map(|p| format!("; beside {p}")).collect::<String>();
-    let name = record.benchmark.name();
-    format!("{}{settings}{peers}; docs/bench-{name}.md explains the columns", record.host.line())
+    let name = match record.benchmark {
+        BenchKind::Builders => "docs/bvh.md".to_owned(),
+        other => format!("docs/bench-{}.md", other.name()),
+    };
+    format!("{}{settings}{peers}; {name} explains the columns", record.host.line())
 }
 
 /// The description of a scene, its tables, and remarks on them.

@@ -19,7 +19,7 @@ const HELP_ALL: &str = "--help-all";
 pub fn definition() -> Command {
     let with_alias = |command: Command| command.mut_arg("gltf_scene", |a| a.visible_alias("scene"));
     // `compare` has a file after --scene
-    let commands = ["render", "view", "info", "export"];
+    let commands = ["render", "view", "info", "export", "bvh"];
     let has_alias =
         |c: &Command| commands.contains(&c.get_name()) && c.get_arguments().any(|a| a.get_id() == "gltf_scene");
     arrange(Cli::command().mut_subcommands(|c| if has_alias(&c) { with_alias(c) } else { c }))

@@ -2,6 +2,9 @@
 //! on stdout with `--json`) and an exit code of [`EXIT_CODES`].
 
 mod args;
+mod bvh;
+#[cfg(feature = "report")]
+mod bvh_page;
 #[cfg(feature = "compare")]
 mod compare;
 #[cfg(feature = "compare")]
@@ -89,6 +92,8 @@ enum Command {
     View(Box<view::ViewArgs>),
     /// Describe a scene (geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device), or an image
     Info(info::InfoArgs),
+    /// Describe the hierarchy that rays traverse: cost, overlap and leaves level by level, and what rays cost in it
+    Bvh(Box<bvh::BvhArgs>),
     /// List the built-in scenes
     Scenes(args::ScenesArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
@@ -232,6 +237,7 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         #[cfg(feature = "viewer")]
         Command::View(args) => return view::run(&args),
         Command::Info(args) => return info::run(&args),
+        Command::Bvh(args) => return bvh::run(&args),
         Command::Scenes(args) => scenes::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Rays(args) => rays::run(&args),

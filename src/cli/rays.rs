@@ -110,7 +110,7 @@ fn read_mesh(args: &RaysArgs) -> Result<Scene> {
 }
 
 /// Reads RAYS.bin.
-fn read_rays(path: &Path) -> Result<Vec<Ray>> {
+pub(super) fn read_rays(path: &Path) -> Result<Vec<Ray>> {
     let bytes = files::read(path)?;
     if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
         let message = format!(

@@ -34,6 +34,12 @@ impl Trees {
                 Kernel::Wide
             )));
         }
+        if options.heuristic.is_some() && !matches!(kernel, Kernel::Nearest | Kernel::Direction) {
+            return Err(Error::Usage(format!(
+                "traversal '{kernel}' takes no tree of a heuristic; use --traversal {}",
+                Kernel::Nearest
+            )));
+        }
         Ok(match kernel {
             Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
             Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options), kernel),

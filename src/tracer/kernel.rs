@@ -3,6 +3,7 @@
 use crate::accel::BuildPreset;
 use crate::accel::cache::Cache;
 use crate::accel::flatten::FlatScene;
+use crate::accel::lab::{Builder, Heuristic};
 use crate::gpu::DeviceInfo;
 use crate::settings::choices;
 use crate::shaders::StreamShaders;
@@ -74,6 +75,9 @@ pub struct ComputeOptions {
 pub struct BuildOptions {
     /// Build quality; `None` chooses by the numbers of primitives and rays ([`BuildPreset::auto`]).
     pub preset: Option<BuildPreset>,
+    /// Rules of the laboratory in place of a preset, for the binary kernels only. Its rays are in
+    /// world space.
+    pub heuristic: Option<Heuristic>,
     /// Approximate number of rays that will be traced.
     pub rays: u64,
     /// Cache of built hierarchies, used for those of the wide kernel only; `None` caches nothing.
@@ -85,7 +89,7 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None, streams: Vec::new() }
+        Self { preset: Some(BuildPreset::Default), heuristic: None, rays: 0, cache: None, streams: Vec::new() }
     }
 }
 
@@ -98,6 +102,13 @@ impl BuildOptions {
     /// The preset for a number of primitives.
     pub fn preset(&self, primitives: usize) -> BuildPreset {
         self.preset.unwrap_or_else(|| BuildPreset::auto(primitives, self.rays))
+    }
+
+    /// The builder of the binary kernels' trees for a number of primitives. The rays of a heuristic
+    /// are relative to the origin of `flat`.
+    pub fn builder(&self, flat: &FlatScene, primitives: usize) -> Builder {
+        let relative = |h: Heuristic| Builder::Heuristic(h.for_rays(h.rays.relative_to(flat.origin)));
+        self.heuristic.map_or_else(|| Builder::Preset(self.preset(primitives)), relative)
     }
 }
 

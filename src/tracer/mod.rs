@@ -46,7 +46,7 @@ pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
 pub use needs::Needs;
 pub use raster_instance::RasterInstance;
-pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
+pub use settings::{BuildChoice, BuildMethod, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
 #[cfg(feature = "probes")]
 pub use wide::probes as hierarchy_probes;

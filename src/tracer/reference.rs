@@ -9,12 +9,10 @@ use super::kernel::{BuildOptions, Kernel};
 use super::upload::write_records;
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::FlatScene;
+use crate::accel::lab::builder::MAX_LEAF;
 use crate::accel::{Aabb, Bvh2, bvh2};
 use crate::error::Result;
 use crate::gpu::Device;
-
-/// Maximum number of primitives in a leaf: more cost memory accesses, fewer cost nodes.
-const MAX_LEAF: u32 = 4;
 
 /// The trees on the host.
 pub(super) struct Trees {
@@ -27,17 +25,18 @@ pub(super) struct Trees {
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
         let (mut groups, mut bounds) = (Vec::new(), Vec::new());
-        for g in &flat.groups {
+        for (k, g) in flat.groups.iter().enumerate() {
             let boxes: Vec<_> = primitive_boxes(flat, g).collect();
             bounds.push(boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union));
-            groups.push(Bvh2::build(&boxes, options.preset(boxes.len()), MAX_LEAF));
+            let builder = options.builder(flat, boxes.len()).for_group(flat.instances.iter().filter(|i| i.group == k));
+            groups.push(Bvh2::from_tree(builder.tree(&boxes, MAX_LEAF)));
         }
         let mut top = None;
         if !flat.is_single_level() {
             bounds = instance_boxes(flat, &bounds);
             // a leaf of the top level holds one instance, because traversal continues in the
             // instance's own BVH
-            top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
+            top = Some(Bvh2::from_tree(options.builder(flat, bounds.len()).tree(&bounds, 1)));
         }
         Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }
     }

@@ -2,9 +2,13 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use crate::accel::BuildPreset;
 use crate::accel::cache::Cache;
+use crate::accel::lab::{Builder, HeuristicChoice, RayDistribution};
 use crate::error::{Error, Result};
+use crate::settings::parse::parse_vector;
 use crate::settings::{AppliesTo, choices, settings};
 use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTest};
 
@@ -61,6 +65,65 @@ impl BuildChoice {
     }
 }
 
+choices! {
+    /// How a BVH is built: a quality, or rules of the laboratory (docs/bvh.md), of which those of
+    /// projected areas and facing planes are for rays of one direction or point.
+    pub enum BuildMethod {
+        /// Chosen by the number of primitives and rays
+        Auto = "auto",
+        /// Fastest build
+        Fast = "fast",
+        /// Balanced
+        Default = "default",
+        /// Spatial splits: fastest traversal
+        Best = "best",
+        /// Surface area, planes across the longest axis
+        SahLongest = "sah-longest",
+        /// Surface area, planes across all axes
+        Sah = "sah",
+        /// Surface area, planes along given rays first
+        SahSpfh = "sah-spfh",
+        /// Area projected along given rays, planes across the longest axis
+        PahLongest = "pah-longest",
+        /// Area projected along given rays, planes across all axes
+        Pah = "pah",
+        /// Area projected along given rays, planes along them first
+        PahSpfh = "pah-spfh",
+    }
+}
+
+impl BuildMethod {
+    /// The build preset; `None` for rules of the laboratory, and where the numbers of primitives
+    /// and rays choose.
+    pub fn preset(self) -> Option<BuildPreset> {
+        match self {
+            Self::Fast => Some(BuildPreset::Fast),
+            Self::Default => Some(BuildPreset::Default),
+            Self::Best => Some(BuildPreset::Best),
+            _ => None,
+        }
+    }
+
+    /// The rules of the laboratory; `None` for presets.
+    pub fn heuristic(self) -> Option<HeuristicChoice> {
+        match self {
+            Self::Auto | Self::Fast | Self::Default | Self::Best => None,
+            Self::SahLongest => Some(HeuristicChoice::SahLongest),
+            Self::Sah => Some(HeuristicChoice::Sah),
+            Self::SahSpfh => Some(HeuristicChoice::SahSpfh),
+            Self::PahLongest => Some(HeuristicChoice::PahLongest),
+            Self::Pah => Some(HeuristicChoice::Pah),
+            Self::PahSpfh => Some(HeuristicChoice::PahSpfh),
+        }
+    }
+
+    /// The builder for rays, with the default preset where it is left open.
+    pub fn builder(self, rays: RayDistribution) -> Builder {
+        let preset = Builder::Preset(self.preset().unwrap_or_default());
+        self.heuristic().map_or(preset, |h| Builder::Heuristic(h.heuristic(rays)))
+    }
+}
+
 settings! {
     /// Settings of the device and the tracer.
     "Device"
@@ -71,8 +134,14 @@ settings! {
         traversal: Option<Kernel>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Ray-triangle intersection test of the compute tracer [default: watertight]
         triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL), research;
-        /// BVH build quality of the compute tracer [default: auto]
-        build: Option<BuildChoice>, option(value_enum), applies(AppliesTo::ALL), research;
+        /// BVH build of the compute tracer: a quality, or for --traversal nearest and direction rules for rays that are known [default: auto]
+        build: Option<BuildMethod>, option(value_enum), applies(AppliesTo::ALL), research;
+        /// Direction of the rays that --build sah-spfh and pah... are for
+        build_direction: Option<DVec3>,
+            option(value_name = "X,Y,Z", value_parser = parse_vector, conflicts_with = "build_eye", allow_hyphen_values = true), applies(AppliesTo::ALL), research;
+        /// Point through which the rays pass that --build sah-spfh and pah... are for
+        build_eye: Option<DVec3>,
+            option(value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true), applies(AppliesTo::ALL), research;
         /// Cache the compute tracer's BVHs in this folder, and reuse them for the same geometry
         /// [env: SKYLIT_BVH_CACHE]
         bvh_cache: Option<PathBuf>, option(value_name = "DIR", value_hint = clap::ValueHint::DirPath), applies(AppliesTo::ALL);
@@ -89,8 +158,8 @@ impl DeviceSettings {
         crate::gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() }
     }
 
-    /// BVH build quality.
-    pub fn build(&self) -> BuildChoice {
+    /// How the BVH is built.
+    pub fn build(&self) -> BuildMethod {
         self.build.unwrap_or_default()
     }
 
@@ -99,10 +168,16 @@ impl DeviceSettings {
         let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
         BuildOptions {
             preset: self.build().preset(),
+            heuristic: self.build().heuristic().map(|h| h.heuristic(self.build_rays().unwrap_or_default())),
             rays,
             cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
             streams: Vec::new(),
         }
+    }
+
+    /// The rays that the BVH is built for, in world space; `None` where none are given.
+    fn build_rays(&self) -> Option<RayDistribution> {
+        self.build_direction.map(RayDistribution::Parallel).or(self.build_eye.map(RayDistribution::Point))
     }
 
     /// Returns true if the compute tracer is requested.
@@ -115,7 +190,9 @@ impl DeviceSettings {
         let given = [
             (self.traversal.is_some(), "--traversal"),
             (self.triangle_test.is_some(), "--triangle-test"),
-            (self.build() != BuildChoice::Auto, "--build"),
+            (self.build() != BuildMethod::Auto, "--build"),
+            (self.build_direction.is_some(), "--build-direction"),
+            (self.build_eye.is_some(), "--build-eye"),
             (self.bvh_cache.is_some(), "--bvh-cache"),
         ];
         given.into_iter().find_map(|(given, name)| given.then_some(name))
@@ -127,6 +204,7 @@ impl DeviceSettings {
     /// [`Error::Usage`] for an option of the compute tracer with another tracer, and for a build or
     /// cache option with a traversal that has no BVH or does not cache it.
     pub fn check(&self) -> Result<()> {
+        self.check_heuristic()?;
         if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) =
             (self.tracer, self.compute_only_option())
         {
@@ -135,7 +213,7 @@ impl DeviceSettings {
             )));
         }
         let option = match self.traversal {
-            Some(Kernel::Brute) if self.build() != BuildChoice::Auto => Some("--build"),
+            Some(Kernel::Brute) if self.build() != BuildMethod::Auto => Some("--build"),
             Some(Kernel::Brute | Kernel::Nearest | Kernel::Direction) if self.bvh_cache.is_some() => {
                 Some("--bvh-cache")
             }
@@ -145,6 +223,31 @@ impl DeviceSettings {
             (Some(option), Some(kernel)) => Err(Error::Usage(format!(
                 "{option} has no effect on --traversal {kernel}, which {}: leave it out, or choose another traversal",
                 if kernel == Kernel::Brute { "has no BVH" } else { "does not cache its BVH" }
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks the options of builds for known rays.
+    fn check_heuristic(&self) -> Result<()> {
+        let rays = match (self.build_direction, self.build_eye) {
+            (Some(d), _) if d == DVec3::ZERO => {
+                return Err(Error::Usage("--build-direction 0,0,0 is no direction: give another".into()));
+            }
+            (Some(_), _) => Some("--build-direction"),
+            (_, Some(_)) => Some("--build-eye"),
+            _ => None,
+        };
+        let build = self.build();
+        match (build.heuristic(), rays) {
+            (Some(_), _) if !matches!(self.traversal, Some(Kernel::Nearest | Kernel::Direction)) => Err(Error::Usage(
+                format!("--build {build} is for the binary kernels only: add --traversal nearest or direction"),
+            )),
+            (Some(h), None) if h.needs_rays() => Err(Error::Usage(format!(
+                "--build {build} is for rays that are known: add --build-direction X,Y,Z or --build-eye X,Y,Z"
+            ))),
+            (h, Some(option)) if !h.is_some_and(HeuristicChoice::needs_rays) => Err(Error::Usage(format!(
+                "{option} has no effect on --build {build}: leave it out, or use --build pah-spfh"
             ))),
             _ => Ok(()),
         }
@@ -190,6 +293,8 @@ mod tests {
                 e.to_string()
             })
         };
+
+        // an option that nothing takes
         for (line, about) in [
             ("--tracer pipeline --build best", "--build applies to the compute tracer"),
             ("--tracer query --bvh-cache d", "--bvh-cache applies to the compute tracer"),
@@ -198,13 +303,24 @@ mod tests {
             ("--traversal brute --build fast", "--build has no effect on --traversal brute"),
             ("--traversal brute --bvh-cache d", "--bvh-cache has no effect on --traversal brute"),
             ("--traversal nearest --bvh-cache d", "--bvh-cache has no effect on --traversal nearest"),
+            ("--build pah", "--build pah is for the binary kernels only"),
+            ("--traversal wide --build sah", "--build sah is for the binary kernels only"),
+            ("--traversal nearest --build pah", "--build pah is for rays that are known"),
+            ("--traversal nearest --build sah --build-eye 1,2,3", "--build-eye has no effect on --build sah"),
+            ("--build-direction 1,2,3", "--build-direction has no effect on --build auto"),
+            ("--traversal nearest --build pah --build-direction 0,0,0", "--build-direction 0,0,0 is no direction"),
             ("--traversal direction --bvh-cache d", "--bvh-cache has no effect on --traversal direction"),
         ] {
             assert!(refused(line).is_some_and(|e| e.starts_with(about)), "{line}: {:?}", refused(line));
         }
-        for line in
-            ["", "--tracer pipeline", "--tracer compute --build best --bvh-cache d", "--traversal nearest --build fast"]
-        {
+        for line in [
+            "",
+            "--tracer pipeline",
+            "--tracer compute --build best --bvh-cache d",
+            "--traversal nearest --build fast",
+            "--traversal nearest --build sah",
+            "--traversal direction --build pah-spfh --build-direction 0,-1,0",
+        ] {
             assert_eq!(refused(line), None, "{line}");
         }
         for kernel in ["auto", "wide", "packet"] {

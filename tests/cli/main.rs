@@ -13,6 +13,7 @@ mod bench_path;
 #[cfg(unix)]
 mod bench_rays;
 mod bench_report;
+mod bvh;
 mod chosen;
 mod compare;
 mod compare_ao;

@@ -11,6 +11,7 @@ mod flip;
 mod glsl;
 mod images;
 mod known_answers;
+mod lab;
 mod layout;
 mod mask;
 mod oracle;

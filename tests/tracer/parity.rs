@@ -3,6 +3,7 @@
 
 use skylit::accel::BuildPreset;
 use skylit::accel::flatten::FlatScene;
+use skylit::accel::lab::{HeuristicChoice, RayDistribution};
 use skylit::film::{NoControl, camera};
 use skylit::gpu::Device;
 use skylit::integrators::rays::{Mode, trace};
@@ -164,6 +165,45 @@ fn gpu_parity_of_builds() {
             }
         }
     }
+    assert_validation_clean(&device);
+}
+
+/// Trees by the rules of the laboratory, for rays of a direction and of a point, through the binary kernel: the distances are those
+/// of its other builds to the bit, in a scene of one level and in one of two.
+#[test]
+fn gpu_parity_of_heuristics() {
+    let device = device();
+    for name in ["cornell-box", "grid:3", "cornell-spheres"] {
+        let scene = scene(name);
+        let oracle = Oracle::new(&scene, scene.origin());
+        let rays = ray_set(&oracle, &scene, 60_000.min(ray_count()));
+        let distances = |build: &BuildOptions, mode| {
+            let (flat, options) = (FlatScene::new(&scene), ComputeOptions::from(Kernel::Nearest));
+            let t = Tracer::with_build(&device, TracerKind::Compute, &flat, common::ALL, options, build).unwrap();
+            let hits = trace(&t, &rays, mode, 1, &mut NoControl).unwrap().0;
+            hits.iter().map(|h| if mode == Mode::Any { h.is_hit() as u32 } else { h.t.to_bits() }).collect::<Vec<_>>()
+        };
+        for mode in [Mode::Closest, Mode::Any] {
+            let expected = distances(&BuildOptions::default(), mode);
+            for (choice, distribution) in [
+                (HeuristicChoice::SahLongest, RayDistribution::Uniform),
+                (HeuristicChoice::SahSpfh, RayDistribution::Parallel(glam::DVec3::new(0.3, -1.0, 0.2))),
+                (HeuristicChoice::Pah, RayDistribution::Point(glam::DVec3::new(0.1, 1.2, 0.3))),
+                (HeuristicChoice::PahSpfh, RayDistribution::Parallel(glam::DVec3::NEG_Y)),
+            ] {
+                let build = BuildOptions { heuristic: Some(choice.heuristic(distribution)), ..Default::default() };
+                assert!(distances(&build, mode) == expected, "{name} {choice:?} {mode:?}");
+            }
+        }
+    }
+    // no other kernel takes them
+    let scene = scene("cornell-box");
+    let heuristic = Some(HeuristicChoice::Sah.heuristic(RayDistribution::Uniform));
+    let build = BuildOptions { heuristic, ..Default::default() };
+    let wide = ComputeOptions::from(Kernel::Wide);
+    let refused = Tracer::with_build(&device, TracerKind::Compute, &FlatScene::new(&scene), common::ALL, wide, &build);
+    let Err(e) = refused else { panic!("the wide kernel took a heuristic") };
+    assert!(e.exit_code() == 64 && e.to_string().contains("--traversal nearest"), "{e}");
     assert_validation_clean(&device);
 }
 

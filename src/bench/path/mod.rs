@@ -80,8 +80,13 @@ impl PathSession<'_> {
         let flat = FlatScene::for_paths(&loaded.scene);
         let camera = CameraRecord::new(&loaded.camera, flat.origin, aspect);
         let paths = u64::from(size[0]) * u64::from(size[1]) * 4096;
-        let build =
-            BuildOptions { preset: args.build.preset(), rays: paths, cache: None, streams: path::streams().to_vec() };
+        let build = BuildOptions {
+            preset: args.build.preset(),
+            heuristic: None,
+            rays: paths,
+            cache: None,
+            streams: path::streams().to_vec(),
+        };
         let needs = Needs { shading: true, ..Default::default() };
         let (kind, _) = args.tracer.on(self.device.info());
         let tracer = self.device.tracer(&flat, kind, needs, ComputeOptions::default(), &build)?;

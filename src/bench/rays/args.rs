@@ -85,7 +85,7 @@ impl BenchRaysArgs {
         let [width, height] = self.size();
         // a set of rays is traced once more to warm up
         let rays = u64::from(width) * u64::from(height) * (u64::from(self.repeats()) + 1);
-        BuildOptions { preset: self.build.preset(), rays, cache: None, streams: Vec::new() }
+        BuildOptions { preset: self.build.preset(), heuristic: None, rays, cache: None, streams: Vec::new() }
     }
 
     /// Timed repeats.

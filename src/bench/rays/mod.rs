@@ -6,7 +6,7 @@ mod check;
 mod contestant;
 mod edges;
 mod peer;
-mod scenes;
+pub(super) mod scenes;
 mod streams;
 
 pub use args::BenchRaysArgs;
