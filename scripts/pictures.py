@@ -42,9 +42,9 @@ VIEWER = {
     "viewer": (
         ["scenes/courtyard.gltf", "--size", "1160x640"],
         """wait picture
-click Comparison with the truth
+click Comparison
 key X
-wait 60
+wait 75
 screenshot FILE
 """,
     ),
@@ -52,9 +52,8 @@ screenshot FILE
         ["scenes/courtyard.gltf", "--size", "1160x640", "--integrator", "path", "--environment", "0.9,1.0,1.2", "--light",
          "sun direction=-0.5,-1,-0.35 irradiance=4", "--tone-map", "agx", "--exposure", "-0.7"],
         """wait picture
-wait 90
-click Performance
-wait 2
+press 330 430
+wait 160
 screenshot FILE
 """,
     ),

@@ -62,14 +62,14 @@ def visit(rng: random.Random, techniques: Deck, tracers: Deck, folder: Path, num
         ["key U", "wait 1", "key U"],
         # the panel
         ["click Radius", "wait 1", *slide("Radius"), "set Radius = 0.7", "wait 1", "click Radius"],
-        ["click Picture", *slide("Exposure"), "click Picture"],
+        ["click Light", *slide("Exposure"), "click Light"],
         ["key X", "wait 1", "drag-control Line between the images -60 0 0.3", "wait 0.5", "key X"],
         ["key T", "wait 5", "key Space", "wait 0.5", "key Space", "key T"],
         [f"resize {rng.randint(500, 1300)} {rng.randint(420, 900)}", "wait 0.5", "resize 1000 700"],
         ["key Ctrl+S", "wait text:Save the image", "key Ctrl+A", f"type {path()}", "key Enter", "wait text:saved"],
         ["key ?", "wait 0.3", "key Escape", "key N", "wait 0.3", "key N"],
-        *(["click First image", f"click {techniques.next()}", "wait 1.5"] for _ in range(shown)),
-        ["key X", "click Second image", f"click {techniques.next()}", "wait 2", "key X"],
+        *(["click Show", f"click {techniques.next()}", "wait 1.5"] for _ in range(shown)),
+        ["key X", "click Comparison", "click Second image", f"click {techniques.next()}", "wait 2", "click Comparison", "key X"],
     ]
     if has_animation:
         parts.append(["click Animation", "key P", "wait 1.5", "key P", *slide("Time"), "wait 0.5", *slide("Speed"), "click Animation"])

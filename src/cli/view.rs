@@ -22,10 +22,7 @@ use crate::tracer::DeviceSettings;
 #[cfg(feature = "probes")]
 use crate::viewer::headless;
 use crate::viewer::images::Images;
-use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, window};
-
-/// Size of the window, points.
-const DEFAULT_SIZE: [u32; 2] = [1280, 800];
+use crate::viewer::{CPU_FRAME_RATE, DEFAULT_SIZE, GPU_FRAME_RATE, Painter, ViewOptions, window};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -172,7 +169,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         gltf_scene: args.load.gltf_scene.clone(),
         confine,
         geometry: args.load.geometry(),
-        size: settings.image.size.unwrap_or(DEFAULT_SIZE),
+        size: settings.image.size,
         settings,
         device: device_settings,
         frame_rate: match args.frame_rate {

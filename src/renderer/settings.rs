@@ -312,7 +312,9 @@ fn flag_values(name: &str, value: &serde_json::Value) -> Vec<Option<String>> {
         Value::Null | Value::Bool(false) => Vec::new(),
         Value::Bool(true) => vec![None],
         Value::Array(all) if name == "size" => vec![joined(all, "x")],
-        Value::Array(all) if name == "light" => all.iter().map(|v| Some(text(v))).collect(),
+        Value::Array(all) if ["light", "material", "hide", "only"].contains(&name) => {
+            all.iter().map(|v| Some(text(v))).collect()
+        }
         Value::Array(all) => vec![joined(all, ",")],
         value => vec![Some(text(value))],
     }

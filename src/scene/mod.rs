@@ -19,6 +19,7 @@ pub mod light_spec;
 pub mod lights;
 pub mod load;
 pub mod material;
+pub mod material_edit;
 pub mod mesh;
 pub mod motion;
 pub mod orbit;
@@ -146,6 +147,8 @@ pub struct Scene {
     /// Instances that are not there until an animation shows them, as indices into
     /// [`Scene::instances`].
     pub hidden: BTreeSet<usize>,
+    /// Edits by settings, and what they have replaced ([`SceneSettings`]).
+    pub edited: Option<Box<material_edit::EditedScene>>,
     /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
     pub materials: Vec<Material>,
     /// Names of the variants of materials that a file has (KHR_materials_variants).

@@ -1,7 +1,10 @@
 //! Settings of how a scene file is understood where its format leaves it open.
 
+use std::collections::BTreeSet;
+
 use super::Scene;
 use super::material::{AlphaMode, Material, MaterialKind};
+use super::material_edit::{self, EditedScene, MaterialEdit};
 use crate::error::{Error, Result};
 use crate::settings::{AppliesTo, choices, settings};
 
@@ -36,6 +39,18 @@ settings! {
         mtl_dissolve: Option<MtlDissolve>, option(value_enum), applies(AppliesTo::ALL);
         /// Variant of the materials, by its name or its number from 0, of files that have several [default: none]
         variant: Option<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
+        /// Values of a material in place of the file's, by its name or its number from 0, like
+        /// "Red plastic base_color=0.8,0.1,0.1 roughness=0.3"; may be repeated
+        ///
+        /// Keys: base_color=R,G,B (linear, 0 to 1), metallic, roughness, transmission (0 to 1) and
+        /// emission=R,G,B (linear radiance). Textures multiply them, as they do the file's values.
+        material: Vec<MaterialEdit>,
+            option(value_name = "NAME|INDEX KEY=VALUE...", value_parser = material_edit::parse), applies(AppliesTo::ALL);
+        /// Leave an object (an instance of a mesh) out, by its name or its number from 0; may be
+        /// repeated
+        hide: Vec<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
+        /// Leave all objects out but this one, by its name or its number from 0; may be repeated
+        only: Vec<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
     }
 }
 
@@ -44,10 +59,12 @@ impl SceneSettings {
     /// changed it.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a variant that the scene does not have; nothing is changed then.
+    /// [`Error::Usage`] for a variant, a material or an object that the scene does not have; then
+    /// nothing is changed.
     pub fn apply(&self, scene: &mut Scene) -> Result<bool> {
         let variant = self.variant.as_deref().map(|text| find_variant(&scene.variants, text)).transpose()?;
-        let mut has_changed = false;
+        let hidden = self.hidden(scene)?;
+        let mut has_changed = restore(scene, self);
 
         // what `d` means
         let meaning = self.mtl_dissolve.unwrap_or_default();
@@ -68,8 +85,97 @@ impl SceneSettings {
         if let Some(rig) = &mut scene.rig {
             rig.set_variant(variant);
         }
+
+        // values of materials, and objects that are left out
+        if self.edits() {
+            let changed = scene.edited_materials(&self.material);
+            let originals = changed.iter().map(|(k, _)| (*k, scene.materials[*k].clone())).collect();
+            let objects = [self.hide.clone(), self.only.clone()];
+            let before = scene.hidden.clone();
+            let materials = self.material.clone();
+            scene.edited = Some(Box::new(EditedScene { materials, objects, originals, hidden: before }));
+            changed.into_iter().for_each(|(k, material)| scene.materials[k] = material);
+            scene.hidden.extend(hidden);
+        }
         Ok(has_changed)
     }
+
+    /// The instances that are to be left out, if the scene has them and the materials.
+    fn hidden(&self, scene: &Scene) -> Result<Vec<usize>> {
+        let materials = || scene.materials.iter().map(|m| m.name.as_str());
+        let instances = || scene.instances.iter().map(|i| i.name.as_str());
+        let none = |option: &str, text: &str, what: &str, names: &mut dyn Iterator<Item = &str>, count: usize| {
+            const MOST: usize = 8;
+            let names: Vec<&str> = names.filter(|name| !name.is_empty()).take(MOST).collect();
+            let named = if names.is_empty() { String::new() } else { format!(", such as {}", names.join(", ")) };
+            Err(Error::Usage(format!("{option} {text}: the scene has no such {what}, but {count}{named}")))
+        };
+        for edit in &self.material {
+            if material_edit::named(materials(), &edit.material).is_empty() {
+                return none("--material", &edit.material, "material", &mut materials(), scene.materials.len());
+            }
+        }
+        let mut found = [Vec::new(), Vec::new()];
+        for ((option, texts), found) in [("--hide", &self.hide), ("--only", &self.only)].into_iter().zip(&mut found) {
+            for text in texts {
+                let all = material_edit::named(instances(), text);
+                if all.is_empty() {
+                    return none(option, text, "object", &mut instances(), scene.instances.len());
+                }
+                found.extend(all);
+            }
+        }
+        let [mut hidden, only] = found;
+        if !only.is_empty() {
+            hidden.extend((0..scene.instances.len()).filter(|k| !only.contains(k)));
+        }
+        Ok(hidden)
+    }
+
+    /// Whether they change materials or leave objects out.
+    fn edits(&self) -> bool {
+        !self.material.is_empty() || !self.hide.is_empty() || !self.only.is_empty()
+    }
+}
+
+impl Scene {
+    /// The materials that edits change, by index, with all of their values. An edit of a material
+    /// that the scene does not have changes nothing. Edits that are in effect do not count.
+    pub fn edited_materials(&self, edits: &[MaterialEdit]) -> Vec<(usize, Material)> {
+        let mut changed: Vec<(usize, Material)> = Vec::new();
+        for edit in edits {
+            for k in material_edit::named(self.materials.iter().map(|m| m.name.as_str()), &edit.material) {
+                let at = changed.iter().position(|(at, _)| *at == k).unwrap_or_else(|| {
+                    changed.push((k, self.unedited_material(k).clone()));
+                    changed.len() - 1
+                });
+                edit.apply_to(&mut changed[at].1);
+            }
+        }
+        changed
+    }
+
+    /// The instances that settings leave out, beside those that the file hides.
+    pub fn left_out(&self) -> BTreeSet<usize> {
+        let edited = self.edited.iter().flat_map(|e| self.hidden.difference(&e.hidden));
+        edited.copied().collect()
+    }
+
+    /// A material as it is without edits.
+    pub fn unedited_material(&self, index: usize) -> &Material {
+        let original = self.edited.as_ref().and_then(|e| e.originals.iter().find(|(k, _)| *k == index));
+        original.map_or(&self.materials[index], |(_, material)| material)
+    }
+}
+
+/// Takes back what settings have replaced. Returns true if these replace something else.
+fn restore(scene: &mut Scene, by: &SceneSettings) -> bool {
+    let Some(edited) = scene.edited.take() else { return by.edits() };
+    for (k, material) in edited.originals {
+        scene.materials[k] = material;
+    }
+    scene.hidden = edited.hidden;
+    edited.materials != by.material || edited.objects[0] != by.hide || edited.objects[1] != by.only
 }
 
 /// Index of a variant by its name or, where none is called that, its number.

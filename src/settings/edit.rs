@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{AppliesTo, Length};
+use super::{AppliesTo, Length, Level};
 
 /// A setting and its current value.
 pub struct Setting<'a> {
@@ -14,6 +14,8 @@ pub struct Setting<'a> {
     pub help: &'static str,
     /// Integrators and images on which the setting has an effect.
     pub applies: AppliesTo,
+    /// Who needs it.
+    pub level: Level,
     /// The value, to be changed in place.
     pub value: Value<'a>,
 }

@@ -267,6 +267,7 @@ macro_rules! settings {
                         name: stringify!($field),
                         help: concat!($($doc),+).trim(),
                         applies: $applies,
+                        level: $crate::settings::Level::from_words(&[$(stringify!($level))?]),
                         value: $crate::settings::Editable::value(&mut self.$field),
                     },
                 )*]

@@ -253,6 +253,15 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     ShadingFeatures { bsdfs, materials, textures }
 }
 
+/// Whether a tracer and its passes that were built for a scene with the material `before` can show
+/// it as `after`: it needs nothing else of shaders, structures and lists of lights. `may_emit`: the
+/// lists of lights allow for another emission.
+pub(crate) fn is_shown_alike(before: &Material, after: &Material, may_emit: bool) -> bool {
+    let [was_dark, is_dark] = [before, after].map(|m| m.emissive.max_element() <= 0.0);
+    let shape = |m: &Material| (model(m), walls(m), refracts(m), has_clear_walls(m), m.unlit, m.base_color.w);
+    was_dark == is_dark && (is_dark || may_emit) && shape(before) == shape(after)
+}
+
 /// Position of the index of refraction that is nearest to one: between keys of an animation there
 /// is no table of its own.
 fn nearest(indices: &[f32], ior: f32) -> u32 {

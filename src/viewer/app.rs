@@ -13,9 +13,11 @@ use super::dialog::{Dialog, RenderWanted, RenderedMotion};
 use super::file_kind::FileKind;
 use super::layer::Layer;
 use super::options::{CPU_FRAME_RATE, ViewOptions};
+use super::remembered::{Hint, Remembered};
 use super::renders::Render;
 use super::request::{
-    Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task,
+    Comparison, DeviceSummary, Event, Mailbox, ObjectSummary, Outline, PickPurpose, Progress, Request, SceneSummary,
+    TRUTH, Task,
 };
 use super::rounding::round_length;
 use super::technique::Technique;
@@ -30,6 +32,7 @@ use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
 use crate::scene::load::{GeometryOptions, LoadOptions};
+use crate::scene::material_edit::MaterialEdit;
 use crate::scene::settings::variant_index;
 use crate::scene::{Camera, Projection};
 use crate::settings::{Capability, Length};
@@ -164,8 +167,8 @@ pub struct App {
     pub control: Option<CameraControl>,
     /// Index of the file's camera that is followed while an animation moves it.
     pub followed: Option<usize>,
-    /// Cameras that the user has kept.
-    pub bookmarks: Vec<(String, Camera)>,
+    /// Cameras that the user has kept, and what they saw.
+    pub bookmarks: Vec<(String, Camera, Option<egui::TextureHandle>)>,
     /// Speed of the turntable, radians per second; 0 at rest.
     pub turntable: f64,
     /// Frame rate to hold; `None`: full resolution always.
@@ -174,6 +177,10 @@ pub struct App {
     pub is_paused: bool,
     /// The animation.
     pub playback: Playback,
+    /// The object that is selected: an index into the instances.
+    pub selected: Option<usize>,
+    /// Outline of the selected object, of the last view at rest.
+    outline: Option<Arc<Outline>>,
     /// Primitive that was clicked on.
     pub pick: Option<Pick>,
     /// Text that says what is being loaded, and the share that is done.
@@ -186,6 +193,12 @@ pub struct App {
     pub load_failures: Vec<String>,
     /// Messages, the last one first.
     pub messages: VecDeque<(Instant, String, bool)>,
+    /// State that is kept from one time to the next; `None`: nothing is.
+    pub remembered: Option<Remembered>,
+    /// It has been taken over.
+    recalled: bool,
+    /// When it was asked how near something is, if there is no answer yet.
+    asked_how_near: Option<Instant>,
     /// The open dialog.
     pub dialog: Option<Dialog>,
     /// The system's file dialog, while it is open.
@@ -262,12 +275,17 @@ impl App {
             frame_rate: options.frame_rate,
             is_paused: false,
             playback: Playback { animation: None, runs: false, time: 0.0, speed: 1.0, repeats: true },
+            selected: None,
+            outline: None,
             pick: None,
             loading: None,
             devices: Vec::new(),
             failure: None,
             load_failures: Vec::new(),
             messages: VecDeque::new(),
+            remembered: None,
+            recalled: false,
+            asked_how_near: None,
             dialog: None,
             browsing: None,
             shows_help: false,
@@ -353,6 +371,7 @@ impl App {
                 let capabilities = self.first.integrator().get().capabilities();
                 let is_lit = capabilities.contains(&Capability::SceneLights);
                 let hint = if is_lit { "" } else { ", which lights path, direct, lit and whitted (4: path)" };
+                self.remember_environment();
                 self.report(format!("environment: {path}{hint}"), false);
             }
             FileKind::Settings => match self.load_settings(Path::new(path)) {
@@ -443,6 +462,7 @@ impl App {
         self.watch_files(context);
         self.watch_renders(context);
         self.advance(context);
+        self.remember(context);
         self.layers.clear();
     }
 
@@ -557,10 +577,13 @@ impl App {
                 Event::LightingRefused(lights, text) => {
                     let [refused, kept] = *lights;
                     self.report(format!("{text}; the light stays as it was"), true);
+                    let file = refused.environment.clone();
+                    self.remembered.iter_mut().for_each(|r| r.environments.retain(|e| Some(e) != file.as_ref()));
                     if self.lighting == refused {
                         self.lighting = kept;
                     }
                 }
+                Event::Outline(outline) => self.outline = Some(outline),
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
                 Event::Exposure(load, stops) if load == self.loaded => self.expose(stops),
                 Event::Exposure(..) => {}
@@ -596,7 +619,8 @@ impl App {
         self.panes.iter_mut().for_each(|p| (p.error, p.black) = (None, None));
         if !is_same_load {
             // indices and names of what was there before
-            self.pick = None;
+            (self.pick, self.outline) = (None, None);
+            self.selected = self.selected.filter(|k| is_same && *k < summary.objects.len());
         }
         if !is_same && self.scene.is_some() {
             // lengths and places of the scene before
@@ -604,6 +628,8 @@ impl App {
             let (ao, given) = (&mut self.settings.integrators.ao, &self.given.integrators.ao);
             (ao.ao_radius, ao.ao_falloff) = (given.ao_radius, given.ao_falloff);
             self.lighting.light.clone_from(&self.given.lighting.light);
+            let file = &mut self.settings.scene;
+            (file.material, file.hide, file.only) = (Vec::new(), Vec::new(), Vec::new());
             if self.exposure.1.is_some() && self.settings.picture.exposure == self.exposure.1 {
                 self.settings.picture.exposure = self.given.picture.exposure;
             }
@@ -634,6 +660,7 @@ impl App {
         if chosen.as_deref().is_some_and(|text| variant_index(&summary.variants, text).is_none()) {
             *chosen = None;
         }
+        self.forget_missing(&summary);
         self.scene = Some(summary);
     }
 
@@ -651,7 +678,10 @@ impl App {
 
     fn picked(&mut self, purpose: PickPurpose, pick: Option<Pick>) {
         match (purpose, pick) {
-            (PickPurpose::Describe, pick) => self.pick = pick,
+            (PickPurpose::Describe, pick) => {
+                self.selected = pick.as_ref().map(|pick| pick.instance.0);
+                self.pick = pick;
+            }
             (PickPurpose::Focus, Some(pick)) => {
                 self.leave_followed();
                 if let Some(control) = &mut self.control {
@@ -659,7 +689,160 @@ impl App {
                 }
             }
             (PickPurpose::Focus, None) => {}
+            (PickPurpose::Nearness, pick) => {
+                self.asked_how_near = None;
+                self.control.iter_mut().for_each(|control| control.near = pick.as_ref().map(|pick| pick.distance));
+            }
         }
+    }
+
+    /// Drops settings of materials and objects that a scene does not have, and says so.
+    fn forget_missing(&mut self, scene: &SceneSummary) {
+        let is_there = |text: &str, names: &mut dyn Iterator<Item = &str>| {
+            names.enumerate().any(|(k, name)| name == text || text == k.to_string())
+        };
+        let [instances, _, materials, _] = scene.counts;
+        let is_object = |text: &str| {
+            scene.objects.len() < instances || is_there(text, &mut scene.objects.iter().map(|o| o.name.as_str()))
+        };
+        let is_material = |text: &str| {
+            scene.materials.len() < materials || is_there(text, &mut scene.materials.iter().map(|m| m.name.as_str()))
+        };
+        let file = &mut self.settings.scene;
+        let mut missing = Vec::new();
+        for (option, texts) in [("--hide", &mut file.hide), ("--only", &mut file.only)] {
+            missing.extend(texts.iter().filter(|text| !is_object(text)).map(|text| format!("{option} {text}")));
+            texts.retain(|text| is_object(text));
+        }
+        let edits = file.material.iter().map(|edit| edit.material.as_str());
+        missing.extend(edits.filter(|text| !is_material(text)).map(|text| format!("--material {text}")));
+        file.material.retain(|edit| is_material(&edit.material));
+        missing.into_iter().for_each(|text| self.report(format!("{text}: the scene does not have it"), true));
+    }
+
+    /// Selects an object, or nothing. What was clicked on is forgotten.
+    pub fn select(&mut self, object: Option<usize>) {
+        (self.selected, self.pick) = (object, None);
+    }
+
+    /// The outline of what is selected, if it is that of what is shown.
+    pub fn outline(&self) -> Option<&Outline> {
+        let outline = self.outline.as_deref()?;
+        let shown = self.panes[0].progress.as_ref().and_then(|p| p.camera.as_ref());
+        let is_shown = (Some(outline.object), outline.time, outline.size)
+            == (self.selected, self.playback.time, self.size)
+            && shown == Some(&outline.camera);
+        is_shown.then_some(outline)
+    }
+
+    /// How settings name an object: by its name, unless others have it.
+    fn object_name(&self, object: usize) -> String {
+        let objects = self.scene.as_ref().map(|s| s.objects.as_slice()).unwrap_or_default();
+        let name = objects.get(object).map_or("", |o| o.name.as_str());
+        key(objects.iter().map(|o| o.name.as_str()), object, name)
+    }
+
+    /// Whether each object is left out.
+    pub fn hidden_objects(&self) -> Vec<bool> {
+        let objects = self.scene.as_ref().map(|s| s.objects.as_slice()).unwrap_or_default();
+        let file = &self.settings.scene;
+        let is_in = |texts: &[String], k: usize, name: &str| texts.iter().any(|t| t == name || *t == k.to_string());
+        let is_hidden = |(k, o): (usize, &ObjectSummary)| {
+            is_in(&file.hide, k, &o.name) || !file.only.is_empty() && !is_in(&file.only, k, &o.name)
+        };
+        objects.iter().enumerate().map(is_hidden).collect()
+    }
+
+    /// Leaves an object out, or not any more.
+    pub fn hide(&mut self, object: usize, hides: bool) {
+        let name = self.object_name(object);
+        let file = &mut self.settings.scene;
+        let is_named = |text: &String| *text == name || *text == object.to_string();
+        file.hide.retain(|text| !is_named(text));
+        match (hides, file.only.is_empty()) {
+            (true, true) => file.hide.push(name),
+            (true, false) if file.only.iter().all(is_named) => file.hide.push(name),
+            (true, false) => file.only.retain(|text| !is_named(text)),
+            (false, false) if !file.only.iter().any(is_named) => file.only.push(name),
+            (false, _) => {}
+        }
+    }
+
+    /// Shows an object alone.
+    pub fn isolate(&mut self, object: usize) {
+        let name = self.object_name(object);
+        (self.settings.scene.hide, self.settings.scene.only) = (Vec::new(), vec![name]);
+    }
+
+    /// Leaves no object out.
+    pub fn show_all_objects(&mut self) {
+        (self.settings.scene.hide, self.settings.scene.only) = (Vec::new(), Vec::new());
+    }
+
+    /// Looks at an object from where the camera is.
+    pub fn frame_object(&mut self, object: usize) {
+        let bounds = self.scene.as_ref().and_then(|s| s.objects.get(object)?.bounds);
+        let aspect = f64::from(self.size[0].max(1)) / f64::from(self.size[1].max(1));
+        let Some(bounds) = bounds else { return };
+        self.leave_followed();
+        self.control.iter_mut().for_each(|control| control.frame(bounds, aspect));
+    }
+
+    /// The values of a material that are replaced, by the name that settings have for it.
+    pub fn material_edit(&self, material: usize) -> MaterialEdit {
+        let materials = self.scene.as_ref().map(|s| s.materials.as_slice()).unwrap_or_default();
+        let name = materials.get(material).map_or("", |m| m.name.as_str());
+        let name = key(materials.iter().map(|m| m.name.as_str()), material, name);
+        let found = self.settings.scene.material.iter().find(|edit| edit.material == name);
+        found.cloned().unwrap_or(MaterialEdit { material: name, ..MaterialEdit::default() })
+    }
+
+    /// Replaces values of a material, in place of those that were replaced before.
+    pub fn edit_material(&mut self, edit: MaterialEdit) {
+        let edits = &mut self.settings.scene.material;
+        edits.retain(|other| other.material != edit.material);
+        if !edit.is_empty() {
+            edits.push(edit);
+        }
+    }
+
+    /// Asks how far away what is ahead is, unless the answer is on its way.
+    pub fn ask_how_near(&mut self) {
+        const PATIENCE: Duration = Duration::from_secs(2);
+        if self.asked_how_near.is_none_or(|asked| asked.elapsed() > PATIENCE) {
+            self.asked_how_near = Some(Instant::now());
+            self.task(Task::Pick { at: [0.5; 2], purpose: PickPurpose::Nearness });
+        }
+    }
+
+    /// Notes that a hint is not needed any more.
+    pub fn learn(&mut self, hint: Hint) {
+        self.remembered.iter_mut().for_each(|remembered| remembered.learn(hint));
+    }
+
+    /// Puts the environment among those that are offered again, if it is a file.
+    pub fn remember_environment(&mut self) {
+        if let (Some(file), Some(remembered)) = (self.lighting.environment_file(), &mut self.remembered) {
+            remembered.use_environment(&file.to_string_lossy());
+        }
+    }
+
+    /// Takes over how the window was the last time, and notes how it is.
+    fn remember(&mut self, context: &egui::Context) {
+        let Some(remembered) = &mut self.remembered else { return };
+        if !std::mem::replace(&mut self.recalled, true) {
+            remembered.zoom.into_iter().for_each(|zoom| context.set_zoom_factor(zoom));
+            let theme = |is_dark: bool| if is_dark { egui::Theme::Dark } else { egui::Theme::Light };
+            remembered.is_dark.into_iter().for_each(|is_dark| context.set_theme(theme(is_dark)));
+            self.shows_panel = !remembered.hides_panel;
+            return;
+        }
+        remembered.zoom = Some(context.zoom_factor());
+        remembered.is_dark = match context.options(|o| o.theme_preference) {
+            egui::ThemePreference::System => None,
+            preference => Some(preference == egui::ThemePreference::Dark),
+        };
+        remembered.hides_panel = !self.shows_panel;
     }
 
     /// Loads the scene anew when a file has changed that it was read from.
@@ -776,6 +959,8 @@ impl App {
         if self.compares_now() {
             panes.push(self.truth_settings(&panes[0]));
         }
+        // they change what is shown, not how it is rendered
+        panes.iter_mut().for_each(|settings| settings.scene.material.clear());
 
         // a request like the last one changes nothing
         let request = Request {
@@ -791,6 +976,7 @@ impl App {
             camera: self.control.as_ref().map(|c| c.camera().clone()),
             first_camera: self.settings.camera.clone(),
             followed_camera: self.followed,
+            selected: self.selected,
             shown,
             panes,
             size: self.size,
@@ -1085,12 +1271,26 @@ impl App {
         // defaults are among the settings already
         let fixed = [source, "--no-config".into(), "-o".into(), output.to_owned()];
         let arguments: Vec<String> = fixed.into_iter().chain(self.load_flags()).chain(settings.flags()).collect();
-        match Render::start(&self.program, &arguments, output) {
+        self.start("render", &arguments, output);
+    }
+
+    /// Runs `skylit export` with the scene as it is shown, as a program of its own.
+    pub fn export(&mut self, output: &str) {
+        let Some(scene) = &self.scene else { return };
+        let settings = RenderSettings { scene: self.settings.scene.clone(), ..RenderSettings::default() };
+        let fixed = [scene.source.clone(), "-o".into(), output.to_owned()];
+        let arguments: Vec<String> = fixed.into_iter().chain(self.load_flags()).chain(settings.flags()).collect();
+        self.start("export", &arguments, output);
+    }
+
+    /// Starts this program with a command, of which the status line tells.
+    fn start(&mut self, command: &'static str, arguments: &[String], output: &str) {
+        match Render::start(&self.program, command, arguments, output) {
             Ok(render) => {
-                self.report(format!("rendering {output}"), false);
+                self.report(format!("{command}: {output}"), false);
                 self.renders.push(render);
             }
-            Err(e) => self.report(format!("cannot start skylit render: {e}"), true),
+            Err(e) => self.report(format!("cannot start skylit {command}: {e}"), true),
         }
     }
 
@@ -1119,6 +1319,15 @@ impl App {
         let seconds = ms.iter().sum::<f64>() * 1e-3;
         Some(Figures { median, p95, rays_per_second: rays as f64 / seconds.max(1e-9) })
     }
+}
+
+/// How settings name one of several: by its name, unless it has none, others have it, it is a
+/// number, or it could be taken for a value; else by its number.
+fn key<'a>(names: impl Iterator<Item = &'a str>, index: usize, name: &str) -> String {
+    let is_plain = !name.is_empty() && !name.contains('=') && !name.starts_with('-') && name.parse::<usize>().is_err();
+    let is_one_line = name.split(' ').all(|word| !word.is_empty() && !word.contains(char::is_whitespace));
+    let is_unique = || names.filter(|other| *other == name).take(2).count() == 1;
+    if is_plain && is_one_line && is_unique() { name.to_owned() } else { index.to_string() }
 }
 
 /// Figures of the last frames.

@@ -25,12 +25,13 @@ impl Browsing {
             }
             Dialog::LoadSettings(_) => ("Load settings", &[("Settings", &["json"])]),
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),
+            Dialog::Export(_) => ("Export the scene", &[("glTF", &["glb", "gltf"])]),
             Dialog::Render(..) => {
                 ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng", "mp4", "webm", "gif"])])
             }
         };
         let name = dialog.text_mut().clone();
-        let saves = matches!(dialog, Dialog::Save(_) | Dialog::SaveSettings(_) | Dialog::Render(..));
+        let saves = !matches!(dialog, Dialog::Open(_) | Dialog::LoadSettings(_));
         let (sender, chosen) = channel();
         let show = move || {
             let mut system = rfd::FileDialog::new().set_title(title);

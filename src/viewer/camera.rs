@@ -20,7 +20,9 @@ pub struct CameraControl {
     distance: f64,
     /// Diagonal of the scene's bounds, scene units.
     scene_size: f64,
-    /// Speed of flight, as a factor of what suits the scene.
+    /// Distance of what is ahead, scene units, where something is.
+    pub near: Option<f64>,
+    /// Speed of flight, as a factor of what suits the scene and what is near.
     pub speed: f64,
 }
 
@@ -29,7 +31,7 @@ impl CameraControl {
     pub fn new(camera: Camera, bounds: (DVec3, DVec3)) -> Self {
         let (lo, hi) = bounds;
         let scene_size = (hi - lo).length().max(1e-30);
-        let mut control = Self { opening: camera.clone(), camera, distance: 1.0, scene_size, speed: 1.0 };
+        let mut control = Self { opening: camera.clone(), camera, distance: 1.0, scene_size, near: None, speed: 1.0 };
         control.set_camera(control.camera.clone(), (lo + hi) * 0.5);
         control
     }
@@ -38,6 +40,7 @@ impl CameraControl {
     pub fn set_camera(&mut self, camera: Camera, centre: DVec3) {
         let ahead = (centre - camera.camera_to_world.translation).dot(-camera.camera_to_world.matrix3.z_axis);
         self.camera = camera;
+        self.near = None;
         self.distance = ahead.max(0.02 * self.scene_size);
     }
 
@@ -167,11 +170,31 @@ impl CameraControl {
         self.become_free();
     }
 
+    /// Looks at bounds in the direction of before, from where they fill most of a view of `aspect`,
+    /// width over height. Their middle is the pivot from then on.
+    pub fn frame(&mut self, (lo, hi): (DVec3, DVec3), aspect: f64) {
+        let radius = (0.5 * (hi - lo).length()).max(1e-6 * self.scene_size);
+        match &mut self.camera.projection {
+            Projection::Perspective { fov_y } => {
+                let half = 0.5 * *fov_y;
+                let narrow = half.min((half.tan() * aspect).atan());
+                self.distance = 1.1 * radius / narrow.sin().max(1e-3);
+            }
+            Projection::Orthographic { half_height } => {
+                *half_height = 1.1 * radius / aspect.min(1.0);
+                self.distance = 2.0 * radius;
+            }
+        }
+        self.camera.camera_to_world.translation = (lo + hi) * 0.5 - self.forward() * self.distance;
+        self.become_free();
+    }
+
     /// Flies for some seconds: right, up and forward, each from -1 to 1.
     pub fn fly(&mut self, [right, up, forward]: [f64; 3], seconds: f64) {
         let m = self.camera.camera_to_world.matrix3;
-        // a scene is crossed in five seconds
-        let step = 0.2 * self.scene_size * self.speed * seconds;
+        // a scene is crossed in five seconds, what is near reached in one and a half
+        let near = self.near.map_or(0.2, |near| (near / (1.5 * self.scene_size)).clamp(0.005, 0.2));
+        let step = near * self.scene_size * self.speed * seconds;
         self.shift((m.x_axis * right + DVec3::Y * up - m.z_axis * forward) * step);
     }
 
@@ -299,6 +322,27 @@ mod tests {
         assert!((c.pivot() - before).length() < 1e-9 && is_rigid(c.camera()));
         c.focus(DVec3::new(1.0, 2.0, 3.0));
         assert!((c.pivot() - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn flights_are_slow_where_something_is_near() {
+        let way = |near: Option<f64>| {
+            let mut c = control();
+            c.near = near;
+            let before = c.eye();
+            c.fly([0.0, 0.0, 1.0], 0.1);
+            (c.eye() - before).length()
+        };
+        let size = control().scene_size();
+        assert!((way(None) - 0.02 * size).abs() < 1e-9);
+        assert!((way(Some(0.3)) - 0.02).abs() < 1e-9, "it is reached in one and a half seconds");
+        assert_eq!(way(Some(1e3)), way(None), "never faster than with nothing ahead");
+        assert!(way(Some(0.0)) > 0.0);
+        // and objects are framed
+        let mut c = control();
+        c.frame((DVec3::new(0.4, 1.4, 0.0), DVec3::new(0.6, 1.6, 0.2)), 1.5);
+        assert!((c.pivot() - DVec3::new(0.5, 1.5, 0.1)).length() < 1e-9 && is_rigid(c.camera()));
+        assert!(c.distance < 1.0, "{}", c.distance);
     }
 
     #[test]

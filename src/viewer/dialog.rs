@@ -11,6 +11,8 @@ pub enum Dialog {
     LoadSettings(String),
     /// For a file of settings to write.
     SaveSettings(String),
+    /// For the output of `skylit export`.
+    Export(String),
     /// For the output of `skylit render`, and its settings.
     Render(String, RenderWanted),
 }
@@ -48,6 +50,7 @@ impl Dialog {
             | Self::Save(text)
             | Self::LoadSettings(text)
             | Self::SaveSettings(text)
+            | Self::Export(text)
             | Self::Render(text, _) => text,
         }
     }

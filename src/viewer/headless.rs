@@ -10,6 +10,7 @@ use egui::{Pos2, RawInput, Rect, Vec2};
 
 use super::app::App;
 use super::layer::{BACKGROUND, FrameBuffer};
+use super::options::DEFAULT_SIZE;
 use super::painter::{CpuPainter, Painted};
 use super::request::{EventSender, Mailbox};
 use super::script::{Script, Section};
@@ -38,7 +39,7 @@ pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
     let context = egui::Context::default();
     context.enable_accesskit();
     let mut app = App::new(options, mailbox, events);
-    let outcome = drive(&context, &mut app, &mut script, options.size, &woken);
+    let outcome = drive(&context, &mut app, &mut script, options.size.unwrap_or(DEFAULT_SIZE), &woken);
     app.quit();
     // a panic of it was an event, which the script has seen
     let _ = thread.join();

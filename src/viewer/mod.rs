@@ -19,14 +19,16 @@ mod options;
 pub mod painter;
 pub mod panels;
 mod recent;
+pub mod remembered;
 pub mod renders;
 pub mod request;
 mod rounding;
 #[cfg(feature = "probes")]
 pub mod script;
 pub mod technique;
+mod theme;
 pub mod window;
 pub mod worker;
 
 pub use file_kind::FileKind;
-pub use options::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions};
+pub use options::{CPU_FRAME_RATE, DEFAULT_SIZE, GPU_FRAME_RATE, Painter, ViewOptions};

@@ -4,6 +4,8 @@ use crate::renderer::RenderSettings;
 use crate::scene::load::{Confine, GeometryOptions, LoadOptions};
 use crate::tracer::DeviceSettings;
 
+/// Size of the window where none is given or remembered, points.
+pub const DEFAULT_SIZE: [u32; 2] = [1280, 800];
 /// Frame rate that is held on CPU drivers, frames per second.
 pub const CPU_FRAME_RATE: f64 = 10.0;
 
@@ -35,8 +37,8 @@ pub struct ViewOptions {
     pub settings: RenderSettings,
     /// Device and tracer.
     pub device: DeviceSettings,
-    /// Size of the window, points.
-    pub size: [u32; 2],
+    /// Size of the window, points; `None`: as it was the last time.
+    pub size: Option<[u32; 2]>,
     /// Frame rate to hold while something moves, frames per second; `None`: full resolution always.
     pub frame_rate: Option<f64>,
     /// Who paints the window.

@@ -1,4 +1,5 @@
-//! Renders beside the window: `skylit render` as a program of its own, with its progress.
+//! Renders beside the window: `skylit render` as a program of its own, with its progress; and
+//! `skylit export` likewise.
 
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
@@ -14,6 +15,7 @@ const INTERRUPTED: i32 = 130;
 pub struct Render {
     /// The file that it writes.
     pub output: String,
+    command: &'static str,
     child: Child,
     heard: Arc<Mutex<Heard>>,
     listener: Option<std::thread::JoinHandle<()>>,
@@ -45,13 +47,13 @@ impl Heard {
 }
 
 impl Render {
-    /// Starts `program render` with these arguments, which write `output`.
+    /// Starts `program COMMAND` with these arguments, which write `output`.
     ///
     /// # Errors
     /// Those of starting a program and a thread.
-    pub fn start(program: &Path, arguments: &[String], output: &str) -> io::Result<Self> {
+    pub fn start(program: &Path, command: &'static str, arguments: &[String], output: &str) -> io::Result<Self> {
         let mut child = Command::new(program)
-            .arg("render")
+            .arg(command)
             .args(arguments)
             .env("SKYLIT_PROGRESS_SECONDS", PROGRESS_SECONDS)
             .stdin(Stdio::null())
@@ -68,7 +70,8 @@ impl Render {
             };
             std::thread::Builder::new().name("render".into()).spawn(listen)
         });
-        Ok(Self { output: output.to_owned(), child, heard, listener: listener.transpose()?, is_cancelled: false })
+        let listener = listener.transpose()?;
+        Ok(Self { output: output.to_owned(), command, child, heard, listener, is_cancelled: false })
     }
 
     /// Share that is done, and how long it has taken and will take; `None` before it is known.
@@ -102,13 +105,14 @@ impl Render {
         }
         let output = &self.output;
         if status.success() {
-            return Some((format!("rendered {output}"), false));
+            let done = if self.command == "export" { "exported" } else { "rendered" };
+            return Some((format!("{done} {output}"), false));
         }
         if self.is_cancelled || status.code() == Some(INTERRUPTED) {
             return Some((format!("{output} was cancelled"), false));
         }
         let said = self.heard.lock().unwrap_or_else(PoisonError::into_inner).last.clone();
-        let reason = if said.is_empty() { format!("skylit render ended with {status}") } else { said };
+        let reason = if said.is_empty() { format!("skylit {} ended with {status}", self.command) } else { said };
         Some((format!("{output}: {reason}"), true))
     }
 }

@@ -14,7 +14,7 @@ use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
 use crate::scene::load::GeometryOptions;
-use crate::scene::{Camera, SceneSettings};
+use crate::scene::{Camera, Material, SceneSettings};
 use crate::tracer::DeviceSettings;
 
 /// Index of an image: the first, the second or the truth ([`TRUTH`]).
@@ -50,6 +50,8 @@ pub struct Request {
     pub first_camera: CameraSettings,
     /// Index of the file's camera that the animation moves, if the view follows it.
     pub followed_camera: Option<usize>,
+    /// The instance whose outline is wanted, an index.
+    pub selected: Option<usize>,
     /// Images to render: those on the screen, then the truth.
     pub panes: Vec<RenderSettings>,
     /// Number of images on the screen, which are rendered while something moves.
@@ -78,7 +80,8 @@ impl Request {
     /// same camera at the same size on the same device.
     pub fn shows_same_view(&self, other: &Self) -> bool {
         let view = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size);
-        let lit = |r: &Self| (r.scene.clone(), r.device.clone(), r.lighting.clone(), r.camera.clone());
+        let lit =
+            |r: &Self| (r.scene.clone(), r.meaning.clone(), r.device.clone(), r.lighting.clone(), r.camera.clone());
         view(self) == view(other) && lit(self) == lit(other)
     }
 
@@ -119,6 +122,8 @@ pub enum PickPurpose {
     Describe,
     /// The camera looks at the point.
     Focus,
+    /// The camera flies at a speed that suits the distance of the point.
+    Nearness,
 }
 
 /// Report of the renderer to the window.
@@ -155,6 +160,8 @@ pub enum Event {
     Idle(u64),
     /// A point was picked.
     Picked(PickPurpose, Box<Option<Pick>>),
+    /// The outline of what is selected was found, seen by a camera at rest.
+    Outline(Arc<Outline>),
     /// A file was written, or an error.
     Saved(Result<PathBuf, String>),
     /// A message for the user.
@@ -186,12 +193,48 @@ pub struct SceneSummary {
     pub variants: Vec<String>,
     /// Names of textures.
     pub textures: Vec<String>,
+    /// Instances of the scene, by index.
+    pub objects: Arc<Vec<ObjectSummary>>,
+    /// Materials of the scene as they are without edits, by index.
+    pub materials: Arc<Vec<Material>>,
     /// Number of triangles and spheres over all instances.
     pub primitives: u64,
     /// Number of instances, meshes, materials and lights.
     pub counts: [usize; 4],
     /// Seconds that loading took.
     pub seconds: f64,
+}
+
+/// An instance of a mesh, as the window lists it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjectSummary {
+    /// Name of its node; may be empty.
+    pub name: String,
+    /// Index of its mesh, and the mesh's name.
+    pub mesh: (usize, String),
+    /// Index of its material.
+    pub material: usize,
+    /// Triangles or spheres.
+    pub primitives: usize,
+    /// Bounds in world space, scene units; `None` where it has no geometry.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// It is not there until an animation shows it.
+    pub is_hidden: bool,
+}
+
+/// Where an object ends in the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// The instance, an index.
+    pub object: usize,
+    /// The camera that it is seen by.
+    pub camera: Camera,
+    /// Time of the animation, seconds.
+    pub time: f64,
+    /// Size of the view, pixels.
+    pub size: [u32; 2],
+    /// Points of lines, from (0, 0) at the top left of the view to (1, 1).
+    pub lines: Vec<Vec<[f32; 2]>>,
 }
 
 /// Figures of the device that the window shows.

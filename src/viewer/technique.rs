@@ -2,6 +2,7 @@
 //! integrators of stills, and the truth of what is beside it.
 
 use crate::integrators::{self, IntegratorName};
+use crate::interface::ToneMap;
 use crate::realtime::display::DisplayMode;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::realtime::{FilterKind, Preset, Technique as AoTechnique};
@@ -28,12 +29,14 @@ pub enum Technique {
 }
 
 /// Headings of the list of techniques.
-pub const GROUPS: [&str; 4] = ["Ambient occlusion in real time", "Light in real time", "Converging images", "Buffers"];
+pub const GROUPS: [&str; 5] =
+    ["Ambient occlusion in real time", "Light in real time", "Converging images", "Buffers", "Research: Larsen (2019)"];
 
 impl Technique {
     /// All of them, by [`GROUPS`].
     pub fn all() -> Vec<(usize, Self)> {
-        let presets = [Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Larsen, Preset::LarsenFixed];
+        let presets = [Preset::Fast, Preset::Balanced, Preset::Quality];
+        let research = [Preset::Larsen, Preset::LarsenFixed].map(|preset| (4, Self::Preset(preset)));
         let stills = || integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name())).map(Self::Still);
         let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Result);
         let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
@@ -45,7 +48,7 @@ impl Technique {
         });
         // what frames have, and what only stills have: colours of materials
         let buffers = buffers.map(Self::Buffer).chain(stills().filter(|t| t.is_view_of_surfaces())).map(|t| (3, t));
-        realtime.chain(light).chain(converging).chain(buffers).collect()
+        realtime.chain(light).chain(converging).chain(buffers).chain(research).collect()
     }
 
     /// Name in lists.
@@ -86,6 +89,11 @@ impl Technique {
     fn is_view_of_surfaces(self) -> bool {
         let Self::Still(integrator) = self else { return false };
         !integrator.can(Capability::AmbientVisibility) && !integrator.can(Capability::LightTransport)
+    }
+
+    /// Returns true for images of the light of a scene, which a camera would see.
+    pub fn is_seen_by_camera(self) -> bool {
+        matches!(self, Self::Still(_) | Self::Frames(_)) && self.integrator().can(Capability::SceneLights)
     }
 
     /// Returns true for stills of light that can be frames in real time, too.
@@ -194,6 +202,10 @@ impl Technique {
                 FrameSettings::default()
             }
         };
+        // bright light keeps its colour, as in a photograph
+        if self.is_seen_by_camera() {
+            settings.picture.tone_map.get_or_insert(ToneMap::Agx);
+        }
         settings.clear_unused();
         settings
     }

@@ -234,6 +234,50 @@ fn variants() {
     assert!(apply(&mut plain, Some("0")).unwrap_err().to_string().contains("no variants"));
 }
 
+/// Values of materials and objects that are left out are settings: by name or number, whatever was applied before.
+#[test]
+fn materials_and_objects_are_edited() {
+    use skylit::scene::{builtin, material_edit};
+
+    let mut scene = builtin::by_name("cornell-box").unwrap();
+    let before = scene.clone();
+    let name = |k: usize| before.materials[k].name.clone();
+    let edited = |material: &[&str], hide: &[&str], only: &[&str]| SceneSettings {
+        material: material.iter().map(|text| material_edit::parse(text).unwrap()).collect(),
+        hide: hide.iter().map(|text| (*text).to_owned()).collect(),
+        only: only.iter().map(|text| (*text).to_owned()).collect(),
+        ..SceneSettings::default()
+    };
+    let by_name = format!("{} roughness=0.25", name(0));
+    let settings = edited(&[&by_name, "0 base_color=1,0,0.5", "1 metallic=1"], &["0"], &[]);
+    assert!(settings.apply(&mut scene).unwrap(), "it has changed");
+    assert_eq!((scene.materials[0].roughness, scene.materials[1].metallic), (0.25, 1.0));
+    assert_eq!(scene.materials[0].base_color.truncate(), glam::Vec3::new(1.0, 0.0, 0.5));
+    assert!(scene.hidden.contains(&0) && !settings.apply(&mut scene).unwrap(), "once is enough");
+
+    // one alone; the materials are the file's again
+    assert!(edited(&[], &[], &["1"]).apply(&mut scene).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.glb");
+    skylit::scene::export::export_gltf(&scene, &path).unwrap();
+    let written = skylit::scene::load::load(&path.to_string_lossy()).unwrap();
+    assert_eq!(written.instances.len(), 1, "what is left out is not written");
+    assert_eq!(written.instances[0].name, before.instances[1].name);
+    assert_eq!(scene.materials, before.materials);
+    assert_eq!(scene.shown_instances().count(), 1);
+    for (settings, parts) in [
+        (edited(&["Velvet roughness=1"], &[], &[]), ["--material Velvet", "no such material"]),
+        (edited(&[], &["lamp 7"], &[]), ["--hide lamp 7", "no such object"]),
+        (edited(&[], &[], &["99"]), ["--only 99", "no such object"]),
+    ] {
+        let error = settings.apply(&mut scene).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+        assert_eq!(scene.shown_instances().count(), 1, "nothing is changed then");
+    }
+    assert!(SceneSettings::default().apply(&mut scene).unwrap());
+    assert_eq!((scene.materials, scene.hidden), (before.materials, before.hidden));
+}
+
 #[test]
 fn variants_that_do_not_exist() {
     for (mapping, expected) in [

@@ -1,5 +1,7 @@
 //! Images in the window, used through their accessibility tree.
 
+use std::sync::Arc;
+
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use skylit::colour::srgb_byte;
@@ -19,7 +21,8 @@ fn harness() -> Harness<'static, Images> {
             ("depth.Z", plane(&|x, _| 3.0 + x as f32)),
         ];
         let channels = channels.map(|(name, values)| Channel::from_floats(name, values)).to_vec();
-        Loaded { path: name.into(), image: Image { width: 40, height: 20, channels, metadata: Vec::new() } }
+        let image = Image { width: 40, height: 20, channels, metadata: Vec::new() };
+        Loaded { path: name.into(), image: Arc::new(image) }
     };
     let app = Images::new(vec![image(1.0, "first.exr"), image(0.0, "second.exr")]);
     let mut harness = Harness::builder()
@@ -143,4 +146,29 @@ fn pixels_are_found_and_enlarged() {
     harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Q);
     harness.run_steps(1);
     assert!(harness.state().closes());
+}
+
+/// Large images are compared beside the window, which answers meanwhile.
+#[test]
+fn large_images_are_compared_beside_the_window() {
+    let image = |value: f32, name: &str| {
+        let channels = ["R", "G", "B"].map(|name| Channel::from_floats(name, vec![value; 600 * 500])).to_vec();
+        let image = Image { width: 600, height: 500, channels, metadata: Vec::new() };
+        Loaded { path: name.into(), image: Arc::new(image) }
+    };
+    let app = Images::new(vec![image(0.5, "first.exr"), image(0.25, "second.exr")]);
+    let mut harness = Harness::builder()
+        .with_size(egui::vec2(800.0, 600.0))
+        .build_state(|context, app: &mut Images| app.show_frame(context), app);
+    let begun = std::time::Instant::now();
+    harness.run_steps(1);
+    press(&mut harness, egui::Key::D);
+    assert_eq!(harness.state().layers().len(), 1, "the image is there");
+    while harness.state().is_comparing() {
+        assert!(begun.elapsed().as_secs() < 60 && harness.query_by_label_contains("comparing").is_some());
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        harness.run_steps(1);
+    }
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("RMSE 2.500e-1").is_some());
 }

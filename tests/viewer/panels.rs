@@ -11,7 +11,8 @@ use skylit::settings::Length;
 use skylit::viewer::app::{App, Arrangement, Second};
 use skylit::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
 use skylit::viewer::request::{
-    Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, TRUTH, Task,
+    Comparison, DeviceSummary, Event, EventSender, Mailbox, ObjectSummary, Outline, PickPurpose, Progress,
+    SceneSummary, TRUTH, Task,
 };
 use skylit::viewer::technique::Technique;
 use skylit::viewer::{FileKind, ViewOptions, panels};
@@ -37,7 +38,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
         geometry: Default::default(),
         settings,
         device: Default::default(),
-        size: [1000, 700],
+        size: Some([1000, 700]),
         frame_rate: Some(10.0),
         painter: Default::default(),
         device_name: None,
@@ -53,6 +54,31 @@ fn loaded() -> Alone {
     loaded_with(RenderSettings::default())
 }
 
+/// Three objects: two of one mesh, of which one has a name.
+fn objects() -> Vec<ObjectSummary> {
+    let object = |name: &str, mesh: usize| ObjectSummary {
+        name: name.into(),
+        mesh: (mesh, ["chair", "table"][mesh].into()),
+        primitives: 12,
+        bounds: Some((glam::DVec3::ZERO, glam::DVec3::splat(0.5))),
+        ..Default::default()
+    };
+    vec![object("left", 0), object("", 0), object("table", 1)]
+}
+
+/// A point of the first object.
+fn a_pick() -> Pick {
+    Pick {
+        position: glam::DVec3::ONE,
+        distance: 1.0,
+        instance: (0, "left".into()),
+        mesh: (0, "chair".into()),
+        primitive: (0, 1),
+        material: (0, String::new()),
+        textures: Vec::new(),
+    }
+}
+
 fn loaded_with(settings: RenderSettings) -> Alone {
     let mut alone = alone_with(Some("builtin:stairs"), settings);
     let scene = skylit::scene::builtin::by_name("stairs").unwrap();
@@ -63,6 +89,9 @@ fn loaded_with(settings: RenderSettings) -> Alone {
         bounds: scene.bounds().unwrap(),
         cameras: scene.cameras.clone(),
         animations: vec![("turn".into(), 2.0), ("bend".into(), 3.0)],
+        materials: Arc::new(scene.materials.clone()),
+        objects: Arc::new(objects()),
+        counts: [3, 2, scene.materials.len(), 0],
         ..Default::default()
     })));
     alone.events.send(Event::Camera(Box::new(scene.cameras[0].clone()), None));
@@ -149,18 +178,12 @@ fn long_names_leave_the_image_its_place() {
     let mut alone = loaded();
     let size = alone.mailbox.peek().size;
     let long = "a_name_without_any_space_as_exporters_make_them_".repeat(4);
-    let pick = Pick {
-        position: glam::DVec3::ONE,
-        distance: 1.0,
-        instance: (0, long.clone()),
-        mesh: (0, long.clone()),
-        primitive: (0, 1),
-        material: (0, long.clone()),
-        textures: Vec::new(),
-    };
+    let pick = Pick { instance: (0, long.clone()), mesh: (0, long.clone()), material: (0, long.clone()), ..a_pick() };
     alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(pick))));
     alone.events.send(Event::Warning(long.clone()));
     alone.events.send(Event::Device(DeviceSummary { name: long.clone(), ..Default::default() }));
+    alone.harness.run_steps(3);
+    alone.click("What was clicked on");
     alone.harness.run_steps(5);
     assert!(alone.harness.query_all_by_label_contains(&long).count() >= 3, "it is shown");
     assert_eq!(alone.mailbox.peek().size, size);
@@ -183,7 +206,10 @@ fn the_device_is_chosen_among_those_there_are() {
 #[test]
 fn every_control_has_a_name() {
     let mut alone = loaded();
-    for section in ["Comparison with the truth", "Real-time frames", "Paths", "Picture", "Light", "Camera", "Device"] {
+    let pick = Pick { material: (0, "white".into()), ..a_pick() };
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(pick))));
+    alone.harness.run_steps(3);
+    for section in ["Scene file", "Comparison", "Light", "Quality", "Camera", "Device", "Research"] {
         // "Camera" is a menu, too
         alone.harness.get_all_by_label(section).last().unwrap().click();
         alone.harness.run_steps(3);
@@ -223,7 +249,7 @@ fn controls_change_what_is_requested() {
     let size = skylit::scene::builtin::by_name("stairs").unwrap().bounds().map(|(lo, hi)| (hi - lo).length()).unwrap();
     assert!((0.05 * size..0.2 * size).contains(&radius), "{radius} of {size}");
 
-    alone.click("Split");
+    alone.click("Compare");
     assert_eq!(alone.harness.state().arrangement, Arrangement::Split(0.5));
     let request = alone.mailbox.peek();
     // the truth is a view of its own, with the same radius
@@ -706,7 +732,7 @@ fn variants_and_scenes_of_a_file_are_chosen() {
     assert_eq!((request.meaning.variant.as_deref(), request.load), (Some("street"), 1));
 
     // another scene of the file does
-    choose(&mut alone, "Scene", "1 street");
+    choose(&mut alone, "Scene of the file", "1 street");
     let request = alone.mailbox.peek();
     assert_eq!((request.gltf_scene.as_deref(), request.load), (Some("1"), 2));
     alone.events.send(Event::Loaded(Box::new(summary(2, "shoe.glb", ["beach", "street"]))));
@@ -919,4 +945,238 @@ fn renders_are_asked_for_watched_and_cancelled() {
     alone.click("1920 x 1080");
     let Some(Dialog::Render(_, changed)) = &alone.harness.state().dialog else { panic!() };
     assert_eq!(*changed, RenderWanted { size: [1920, 1080], ..wanted });
+}
+
+/// Objects are listed by their meshes, selected, hidden and shown alone; settings name them so that `skylit render` does the same.
+#[test]
+fn objects_are_selected_hidden_and_isolated() {
+    let mut alone = loaded();
+    let file = |alone: &Alone| alone.mailbox.peek().meaning;
+    // two of one mesh are below it
+    assert!(alone.harness.query_by_label("left").is_none());
+    alone.click("⏵ chair (2)");
+    alone.click("left");
+    assert_eq!(alone.mailbox.peek().selected, Some(0));
+
+    // without a name, or one that others have, it is a number
+    alone.click("Show chair");
+    assert_eq!(file(&alone).hide, ["1"]);
+    let command = alone.harness.state().command().unwrap();
+    assert!(command.contains(" --hide 1"), "{command}");
+    alone.click("Show chair");
+    assert!(file(&alone).hide.is_empty());
+    alone.click("Hide");
+    assert_eq!(file(&alone).hide, ["left"]);
+    alone.click("Show again");
+    assert!(file(&alone).hide.is_empty());
+
+    // alone, and all again
+    alone.click("Isolate");
+    assert_eq!((file(&alone).only, file(&alone).hide), (vec!["left".to_owned()], Vec::new()));
+    alone.click("Show table");
+    assert_eq!(file(&alone).only, ["left", "table"]);
+    alone.click("Show left");
+    assert_eq!(file(&alone).only, ["table"]);
+    alone.click("Show all");
+    assert_eq!(file(&alone), Default::default());
+
+    // it is looked at, from the same side
+    let before = alone.mailbox.peek().camera.unwrap();
+    alone.click("Frame");
+    let after = alone.mailbox.peek().camera.unwrap();
+    assert_eq!(after.camera_to_world.matrix3, before.camera_to_world.matrix3);
+    let pivot = alone.harness.state().control.as_ref().unwrap().pivot();
+    assert!((pivot - glam::DVec3::splat(0.25)).length() < 1e-9, "{pivot}");
+
+    // by keys
+    let press = |alone: &mut Alone, modifiers: egui::Modifiers, key: egui::Key| {
+        alone.harness.key_press_modifiers(modifiers, key);
+        alone.harness.run_steps(3);
+    };
+    press(&mut alone, egui::Modifiers::NONE, egui::Key::H);
+    assert_eq!(file(&alone).hide, ["left"]);
+    press(&mut alone, egui::Modifiers::SHIFT, egui::Key::H);
+    assert_eq!((file(&alone).only, file(&alone).hide), (vec!["left".to_owned()], Vec::new()));
+    press(&mut alone, egui::Modifiers::SHIFT, egui::Key::H);
+    assert_eq!(file(&alone), Default::default());
+    press(&mut alone, egui::Modifiers::NONE, egui::Key::F);
+    assert!(alone.harness.state().control.as_ref().unwrap().pivot() != pivot, "all of it");
+    press(&mut alone, egui::Modifiers::SHIFT, egui::Key::F);
+    assert!((alone.harness.state().control.as_ref().unwrap().pivot() - pivot).length() < 1e-9);
+
+    // another scene has others
+    alone.click("Isolate");
+    alone.change(|app| app.open("builtin:cornell-box"));
+    let summary =
+        SceneSummary { load: 2, is_complete: true, source: "builtin:cornell-box".into(), ..Default::default() };
+    alone.events.send(Event::Loaded(Box::new(summary)));
+    alone.harness.run_steps(3);
+    assert_eq!((file(&alone), alone.mailbox.peek().selected), (Default::default(), None));
+}
+
+/// The outline of what is selected is shown as long as it is of the view on the screen.
+#[test]
+fn outlines_are_of_what_is_shown() {
+    let mut alone = loaded();
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(a_pick()))));
+    alone.harness.run_steps(2);
+    let request = alone.mailbox.peek();
+    assert_eq!(request.selected, Some(0));
+    let camera = request.camera.unwrap();
+    let progress = |camera: &skylit::scene::Camera| Progress { camera: Some(camera.clone()), ..Default::default() };
+    alone.events.send(Event::Picture(Box::new(progress(&camera))));
+    let lines = vec![vec![[0.1, 0.1], [0.2, 0.1]]];
+    let outline = Outline { object: 0, camera: camera.clone(), time: 0.0, size: request.size, lines };
+    alone.events.send(Event::Outline(Arc::new(outline)));
+    alone.harness.run_steps(2);
+    assert!(alone.harness.state().outline().is_some());
+    let mut moved = camera.clone();
+    moved.camera_to_world.translation.x += 1.0;
+    alone.events.send(Event::Picture(Box::new(progress(&moved))));
+    alone.harness.run_steps(2);
+    assert!(alone.harness.state().outline().is_none(), "of another camera");
+    alone.events.send(Event::Picture(Box::new(progress(&camera))));
+    alone.harness.run_steps(2);
+    alone.change(|app| app.select(Some(1)));
+    assert!(alone.harness.state().outline().is_none(), "of another object");
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(None)));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().selected, None, "a click into the background");
+}
+
+/// Values of the material that is selected are changed, reset, and part of the command and of an export.
+#[test]
+fn materials_are_edited_reset_and_exported() {
+    let mut alone = loaded();
+    assert!(alone.harness.query_by_label("Roughness").is_none());
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(a_pick()))));
+    alone.harness.run_steps(3);
+    let edits = |alone: &Alone| alone.mailbox.peek().meaning.material;
+    let original = alone.harness.state().scene.as_ref().unwrap().materials[0].clone();
+
+    // a slider, dragged
+    use egui::accesskit::{Action, ActionData, Role};
+    let set = |alone: &mut Alone, label: &str, value: f64| {
+        let target = alone.harness.get_by_role_and_label(Role::Slider, label).accesskit_node().id();
+        let data = Some(ActionData::NumericValue(value));
+        let request = egui::accesskit::ActionRequest { action: Action::SetValue, target, data };
+        alone.harness.event(egui::Event::AccessKitActionRequest(request));
+        alone.harness.run_steps(3);
+    };
+    set(&mut alone, "Roughness", 0.25);
+    set(&mut alone, "Emission", 2.0);
+    let [edit] = &edits(&alone)[..] else { panic!("{:?}", edits(&alone)) };
+    assert_eq!((edit.roughness, edit.metallic, edit.emission), (Some(0.25), None, Some(glam::Vec3::splat(2.0))));
+    let request = alone.mailbox.peek();
+    assert!(request.panes[0].scene.material.is_empty(), "the image goes on");
+    let command = alone.harness.state().command().unwrap();
+    assert!(command.contains("--material") && command.contains("roughness=0.25 emission=2,2,2"), "{command}");
+
+    // the file's value is no edit
+    set(&mut alone, "Roughness", f64::from(original.roughness));
+    assert_eq!(edits(&alone)[0].roughness, None);
+    alone.click("Reset material");
+    assert!(edits(&alone).is_empty());
+
+    // written by the program, as the file would have it
+    set(&mut alone, "Metallic", 1.0);
+    alone.click("Export…");
+    let Some(Dialog::Export(name)) = &alone.harness.state().dialog else { panic!() };
+    assert_eq!(name, "stairs-edited.glb");
+}
+
+/// Hints are shown at the first time, and each goes once it has been followed; environments that were used are offered again.
+#[test]
+fn hints_go_and_environments_are_remembered() {
+    use skylit::viewer::remembered::{Hint, Remembered};
+
+    let mut alone = loaded();
+    assert!(!alone.shows("all keys"), "nothing is remembered here");
+    alone.change(|app| app.remembered = Some(Remembered::default()));
+    assert!(alone.shows("orbit") && alone.shows("all keys"));
+    let remembered = |alone: &Alone| alone.harness.state().remembered.clone().unwrap();
+
+    // one that has been followed
+    alone.press(egui::Key::Num4);
+    assert!(!remembered(&alone).needs(Hint::Technique) && remembered(&alone).needs(Hint::Orbit));
+    assert!(!alone.shows("path tracing") && alone.shows("come closer to what is under the pointer"));
+    alone.click("Got it");
+    assert!(!alone.shows("all keys") && Hint::ALL.iter().all(|hint| !remembered(&alone).needs(*hint)));
+
+    // an environment, which is a file, and one that is refused
+    let first = alone.change(|app| app.open_file("sky.hdr")).lighting;
+    alone.harness.get_by_label("Light").click();
+    alone.harness.run_steps(10);
+    let choose = |alone: &mut Alone, item: &str| {
+        alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Environment").click();
+        alone.harness.run_steps(5);
+        alone.harness.get_all_by_label(item).last().unwrap().click();
+        alone.harness.run_steps(5);
+    };
+    choose(&mut alone, "Studio");
+    assert_eq!(alone.mailbox.peek().lighting.environment.as_deref(), Some("studio"));
+    choose(&mut alone, "sky.hdr");
+    assert_eq!(alone.mailbox.peek().lighting.environment, first.environment);
+    let bad = alone.change(|app| app.open_file("broken.exr")).lighting;
+    assert_eq!(remembered(&alone).environments, ["broken.exr", "sky.hdr"]);
+    alone.events.send(Event::LightingRefused(Box::new([bad, first]), "broken.exr: not an image".into()));
+    alone.harness.run_steps(2);
+    assert_eq!(remembered(&alone).environments, ["sky.hdr"]);
+}
+
+/// While the camera flies the renderer is asked how near something is, one question at a time.
+#[test]
+fn flights_ask_how_near_something_is() {
+    let mut alone = loaded();
+    let question = Task::Pick { at: [0.5; 2], purpose: PickPurpose::Nearness };
+    alone.harness.key_down(egui::Key::W);
+    alone.harness.run_steps(5);
+    assert_eq!(alone.mailbox.latest().0.tasks, std::slice::from_ref(&question), "one, whatever time it takes");
+    alone.mailbox.done(&question);
+    let pick = Pick { distance: 0.25, ..a_pick() };
+    alone.events.send(Event::Picked(PickPurpose::Nearness, Box::new(Some(pick))));
+    alone.harness.run_steps(3);
+    alone.harness.key_up(egui::Key::W);
+    alone.harness.run_steps(2);
+    assert_eq!(alone.harness.state().control.as_ref().unwrap().near, Some(0.25));
+    assert_eq!((alone.harness.state().selected, alone.mailbox.latest().0.tasks.len()), (None, 1));
+}
+
+/// Light is shown by AgX unless another tone map is chosen, and so is what is rendered of it; occlusion stays linear.
+#[test]
+fn light_is_shown_by_agx() {
+    use skylit::interface::ToneMap;
+
+    let mut alone = loaded();
+    let tone_map = |alone: &Alone| alone.mailbox.peek().panes[0].picture.tone_map;
+    assert_eq!(tone_map(&alone), None);
+    alone.press(egui::Key::Num4);
+    assert_eq!(tone_map(&alone), Some(ToneMap::Agx));
+    assert!(alone.harness.state().command().unwrap().contains("--tone-map agx"));
+    alone.change(|app| app.settings.picture.tone_map = Some(ToneMap::Linear));
+    assert_eq!(tone_map(&alone), Some(ToneMap::Linear));
+    alone.change(|app| app.first = Technique::Still("ao-sky".parse().unwrap()));
+    alone.change(|app| app.settings.picture.tone_map = None);
+    assert_eq!(tone_map(&alone), None);
+}
+
+/// A camera that is kept has a small picture of what it sees.
+#[test]
+fn kept_cameras_have_pictures() {
+    let mut alone = loaded();
+    alone.press(egui::Key::B);
+    let rgba = (0..300 * 200).flat_map(|k| if k % 300 < 150 { [255, 0, 0, 255] } else { [0, 0, 255, 255] }).collect();
+    let picture = Arc::new(ViewPicture { size: [300, 200], rgba });
+    alone.events.send(Event::Picture(Box::new(Progress { picture, ..Default::default() })));
+    alone.harness.run_steps(2);
+    alone.press(egui::Key::B);
+    let bookmarks = &alone.harness.state().bookmarks;
+    assert!(bookmarks[0].2.is_none(), "there was none yet");
+    assert_eq!(bookmarks[1].2.as_ref().unwrap().size(), [75, 50]);
+    let before = alone.mailbox.peek().camera;
+    alone.change(|app| app.control.as_mut().unwrap().orbit(50.0, 0.0));
+    alone.harness.get_all_by_label("Camera").next().unwrap().click();
+    alone.harness.run_steps(3);
+    alone.click("Kept camera 2");
+    assert_eq!(alone.mailbox.peek().camera, before);
 }

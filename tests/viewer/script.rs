@@ -16,7 +16,7 @@ fn options(scene: Option<&str>) -> ViewOptions {
         geometry: Default::default(),
         settings: RenderSettings::default(),
         device: DeviceSettings::default(),
-        size: [760, 520],
+        size: Some([760, 520]),
         frame_rate: Some(10.0),
         painter: Default::default(),
         device_name: None,
@@ -58,6 +58,8 @@ resize 500 400
 wait 0.3
 resize 760 520
 press 200 250
+wait text:What was clicked on
+click What was clicked on
 wait text:Instance
 key Ctrl+S
 wait text:Save the image

@@ -97,6 +97,96 @@ fn gpu_motion_and_interruptions_leave_nothing_behind() {
     assert_validation_clean(&device());
 }
 
+/// Materials that are edited while they are shown look as they do when the scene is loaded with these values, on every tracer, in a tracer that is built later, too.
+#[test]
+fn gpu_edited_materials_are_those_of_a_fresh_scene() {
+    use skylit::scene::material_edit;
+
+    let edits = |text: &[&str]| text.iter().map(|text| material_edit::parse(text).unwrap()).collect::<Vec<_>>();
+    let wanted = edits(&["0 base_color=0.9,0.1,0.05", "1 base_color=0,0.2,0.9"]);
+    let view_settings = settings(serde_json::json!({ "integrator": "albedo" }));
+    for kind in tracers(&device()) {
+        let mut renderer = renderer("cornell-box", kind.name());
+        let camera = renderer.scene().cameras[0].clone();
+        let picture = |session: &mut skylit::renderer::Interactive| {
+            let mut view = View::new(session, &view_settings, SIZE, &mut NoControl).unwrap();
+            view.step(session, &camera, Duration::from_micros(1), &mut NoControl).unwrap();
+            view
+        };
+
+        // before the first view, and while there is one
+        let mut session = renderer.interactive(&Default::default(), None).unwrap();
+        let mut view = picture(&mut session);
+        let original = view.picture().unwrap().unwrap();
+        assert!(session.edit_materials(&wanted).unwrap(), "{kind}");
+        view.step(&session, &camera, Duration::from_micros(1), &mut NoControl).unwrap();
+        let edited = view.picture().unwrap().unwrap();
+        assert!(edited != original, "{kind}");
+        // what emits light or begins to transmit it needs the scene anew, and nothing changes
+        for text in ["0 emission=1,1,1", "0 transmission=1"] {
+            assert!(!session.edit_materials(&edits(&[text])).unwrap(), "{text}");
+        }
+        assert_eq!(session.edits(), wanted);
+        let mut session = renderer.interactive(&Default::default(), None).unwrap();
+        assert!(session.edit_materials(&wanted).unwrap());
+        assert!(picture(&mut session).picture().unwrap().unwrap() == edited, "{kind}: built later");
+        assert!(session.edit_materials(&[]).unwrap());
+        assert!(picture(&mut session).picture().unwrap().unwrap() == original, "{kind}: reset");
+        drop(session);
+
+        // as `skylit render --material` has it
+        let mut with = view_settings.clone();
+        with.scene.material = wanted.clone();
+        with.image.size = Some(SIZE);
+        with.image.spp = Some(1);
+        let still = renderer.still(&with, &mut NoControl).unwrap();
+        let mut session = renderer.interactive(&Default::default(), None).unwrap();
+        let values = picture(&mut session).values().unwrap().values;
+        let red = still.image.f32("R").unwrap();
+        let samples: Vec<f32> = values.chunks(3).map(|p| p[0]).collect();
+        assert_eq!(samples, red, "{kind}");
+    }
+    assert_validation_clean(&device());
+}
+
+/// Light that an edited surface emits is edited further while it is shown: it lights the scene as it does in a render with these values.
+#[test]
+fn gpu_edited_emission_lights_the_scene() {
+    use skylit::scene::material_edit;
+
+    let mut renderer = renderer("cornell-box", "compute");
+    let camera = renderer.scene().cameras[0].clone();
+    let mut path = settings(serde_json::json!({ "integrator": "path", "image": { "size": SIZE, "spp": 64 } }));
+    let edit = |text: &str| vec![material_edit::parse(text).unwrap()];
+    let mean = |values: &[f32], c: usize| values.iter().skip(c).step_by(3).sum::<f32>() / (values.len() / 3) as f32;
+    let mut render = |renderer: &mut Renderer, text: &str| {
+        path.scene.material = edit(text);
+        let image = renderer.still(&path, &mut NoControl).unwrap().image;
+        let planes = ["R", "G", "B"].map(|c| image.f32(c).unwrap().to_vec());
+        (0..planes[0].len()).flat_map(|k| planes.each_ref().map(|p| p[k])).collect::<Vec<f32>>()
+    };
+    let expected = render(&mut renderer, "2 emission=0,0,3");
+    let first = render(&mut renderer, "2 emission=2,0,0");
+    assert!(mean(&expected, 2) > 1.5 * mean(&first, 2), "{} {}", mean(&expected, 2), mean(&first, 2));
+
+    let mut session = renderer.interactive(&Default::default(), None).unwrap();
+    let wanted = settings(serde_json::json!({ "integrator": "path" }));
+    let mut view = View::new(&mut session, &wanted, SIZE, &mut NoControl).unwrap();
+    view.step(&session, &camera, Duration::from_micros(1), &mut NoControl).unwrap();
+    assert!(session.edit_materials(&edit("2 emission=0,0,3")).unwrap());
+    let mut samples = 0;
+    while samples < 64 {
+        samples = view.step(&session, &camera, STEP, &mut NoControl).unwrap().samples;
+    }
+    let values = view.values().unwrap().values;
+    for c in 0..3 {
+        let (shown, expected) = (mean(&values, c), mean(&expected, c));
+        assert!((shown / expected - 1.0).abs() < 0.1, "{c}: {shown} for {expected}");
+    }
+    // dark again, it has no light in the lists
+    assert!(!session.edit_materials(&[]).unwrap());
+}
+
 /// Every technique renders on every tracer, one view after another with the same tracers in device memory.
 #[test]
 fn gpu_every_technique_has_a_picture() {

@@ -20,8 +20,10 @@ use crate::gpu::Device;
 use crate::integrators::lighting::LightingSettings;
 use crate::realtime::sequence;
 use crate::scene::animation::{AnimationRig, Playback, Pose};
-use crate::scene::{AlphaMode, Camera, Motion, Scene};
+use crate::scene::material_edit::MaterialEdit;
+use crate::scene::{AlphaMode, Camera, Material, Motion, Scene};
 use crate::shaders::StreamShaders;
+use crate::tracer::shading::is_shown_alike;
 use crate::tracer::{
     BuildStats, ComputeOptions, DeviceSettings, MaterialChange, MovedBounds, Needs, Tracer, TracerKind,
 };
@@ -45,6 +47,9 @@ pub struct Interactive<'r> {
     /// Number of tracers built so far.
     built: u32,
     warnings: Vec<String>,
+    /// Materials that are edited beyond the scene's own settings, and the edits in effect.
+    edited: Vec<(usize, Material)>,
+    edits: Vec<MaterialEdit>,
 }
 
 /// An animation and its current pose.
@@ -104,6 +109,8 @@ impl Renderer {
             traced: Vec::new(),
             built: 0,
             warnings: Vec::new(),
+            edited: Vec::new(),
+            edits: self.scene.edited.as_ref().map(|e| e.materials().to_vec()).unwrap_or_default(),
         })
     }
 }
@@ -159,6 +166,55 @@ impl<'r> Interactive<'r> {
         for traced in &mut self.traced {
             traced.update(&animation.pose)?;
         }
+        Ok(true)
+    }
+
+    /// Materials that emit light and that the scene was prepared to have edited. They can be edited
+    /// further.
+    fn edited_emitters(&self) -> Vec<usize> {
+        let all = self.scene.edited.iter().flat_map(|e| e.edited());
+        all.filter(|k| self.scene.materials[*k].emissive.max_element() > 0.0).collect()
+    }
+
+    /// The edits of materials in effect.
+    pub fn edits(&self) -> &[MaterialEdit] {
+        &self.edits
+    }
+
+    /// Shows materials as these edits have them, in place of those before, by writing their records
+    /// anew. Returns false and changes nothing where that is not enough: for light that a surface
+    /// emits, or that it begins to transmit, the scene has to be prepared anew.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn edit_materials(&mut self, edits: &[MaterialEdit]) -> Result<bool> {
+        // all that is edited, or was
+        let mut edited = self.scene.edited_materials(edits);
+        let before = self.edited.iter().map(|(k, _)| *k);
+        let own = self.scene.edited.iter().flat_map(|e| e.edited()).chain(before);
+        for k in own {
+            if !edited.iter().any(|(at, _)| *at == k) {
+                edited.push((k, self.scene.unedited_material(k).clone()));
+            }
+        }
+        let rig = self.animation.as_ref().map(|a| a.rig.motion(a.index)).transpose()?.unwrap_or_default();
+        let emitters = self.edited_emitters();
+        let is_alike = |(k, m): &(usize, Material)| {
+            let is_animated = rig.materials.contains_key(k);
+            is_shown_alike(&self.scene.materials[*k], m, emitters.contains(k)) && !is_animated
+        };
+        if !edited.iter().all(is_alike) {
+            return Ok(false);
+        }
+        for traced in &mut self.traced {
+            traced.materials = traced.tracer.set_materials(&edited)?;
+            traced.edit_lights(&edited);
+            if traced.materials != MaterialChange::None {
+                traced.moved.clear();
+                traced.pose += 1;
+            }
+        }
+        (self.edited, self.edits) = (edited, edits.to_vec());
         Ok(true)
     }
 
@@ -229,10 +285,15 @@ impl<'r> Interactive<'r> {
         let flat = match found {
             Some(k) => self.traced.swap_remove(k).flat,
             None => {
-                let motion = match &self.animation {
+                let mut motion = match &self.animation {
                     Some(a) => a.rig.motion(a.index)?,
                     None => Motion::default(),
                 };
+                // those that emit no light can be edited while they are shown
+                let dark = self.scene.materials.iter().enumerate().filter(|(_, m)| is_shown_alike(m, m, false));
+                for k in dark.map(|(k, _)| k).chain(self.edited_emitters()) {
+                    motion.materials.entry(k).or_default();
+                }
                 FlatScene::with_motion_and_blend(self.scene, motion, blend)?
             }
         };
@@ -247,7 +308,7 @@ impl<'r> Interactive<'r> {
             Some(a) => sequence::moves_lights(self.scene, a.rig, a.index)?,
             None => false,
         };
-        let posed = moves_lights.then(|| Box::new(self.scene.clone()));
+        let posed = (moves_lights || !self.edited_emitters().is_empty()).then(|| Box::new(self.scene.clone()));
         let mut traced = TracedScene {
             flat,
             tracer,
@@ -261,6 +322,8 @@ impl<'r> Interactive<'r> {
         if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
             traced.update(&animation.pose)?;
         }
+        traced.tracer.set_materials(&self.edited)?;
+        traced.edit_lights(&self.edited);
         self.traced.push(traced);
         Ok(self.traced.len() - 1)
     }
@@ -284,6 +347,13 @@ impl TracedScene<'_> {
             self.pose += 1;
         }
         Ok(())
+    }
+
+    /// Gives surfaces that emit light the emission of edited materials.
+    fn edit_lights(&mut self, edited: &[(usize, Material)]) {
+        if let Some(posed) = &mut self.posed {
+            edited.iter().for_each(|(k, material)| posed.materials[*k] = material.clone());
+        }
     }
 
     /// The scene as its tracer holds it, with lights where they are in its pose.

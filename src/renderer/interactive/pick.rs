@@ -62,6 +62,21 @@ impl Interactive<'_> {
         Ok(hit.map(|hit| self.describe(near + f64::from(hit.t), ray.0 + ray.1 * f64::from(hit.t), &hit)))
     }
 
+    /// The instances under points of the image ([`camera_ray`]), indices into
+    /// [`crate::scene::Scene::instances`]; `None` for background, and before the first view.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn objects_at(&self, camera: &Camera, points: &[[f64; 2]], aspect: f64) -> Result<Vec<Option<usize>>> {
+        let rays: Vec<_> = points.iter().map(|at| camera_ray(camera, *at, aspect)).collect();
+        let hits = self.closest_hits(&rays)?.into_iter().zip(&rays);
+        let is_near = |hit: &Hit, direction: DVec3| {
+            let [near, far] = clipped(camera, direction);
+            near + f64::from(hit.t) < far
+        };
+        Ok(hits.map(|(hit, ray)| Some(hit.filter(|hit| is_near(hit, ray.1))?.instance as usize)).collect())
+    }
+
     /// The closest hits of rays as of [`closest_hits`]; all miss before the first view.
     ///
     /// # Errors

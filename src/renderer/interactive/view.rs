@@ -382,7 +382,9 @@ impl View {
             let pixels = aov::render(&traced.tracer, &record, self.size, control)?;
             image.channels.extend(aov::channels(&wanted, &pixels, origin));
             let name = files::portable_name(session.name);
-            let flags = render_flags(&name, session.scene, &self.settings, camera, self.size);
+            let mut settings = self.settings.clone();
+            settings.scene.material = session.edits.clone();
+            let flags = render_flags(&name, session.scene, &settings, camera, self.size);
             image.metadata = camera_numbers::metadata(camera, aspect).map(|(k, v)| (k.to_owned(), v)).to_vec();
             image.metadata.extend([
                 ("camera".into(), camera_text(camera)),

@@ -6,10 +6,12 @@ mod pixels;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use egui::{Context, Pos2, Rect, Vec2};
 
 use super::layer::Layer;
+use super::theme;
 use super::window::WindowApp;
 use crate::error::Result;
 use crate::interface::ToneMap;
@@ -17,6 +19,9 @@ use crate::measure::comparison::{self, CompareOptions, Comparison};
 use crate::memory::Budget;
 use crate::output::{self, Channel, Image, Samples};
 use crate::renderer::interactive::ViewPicture;
+
+/// Pixels from which images are compared on a thread.
+const LARGE: u64 = 1 << 18;
 
 /// Content of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +47,7 @@ pub struct Look {
 /// An image and its name.
 pub struct Loaded {
     pub path: PathBuf,
-    pub image: Image,
+    pub image: Arc<Image>,
 }
 
 /// The source of a picture: as long as it is the same, the picture is.
@@ -76,6 +81,10 @@ pub struct Images {
     pub closes: bool,
     display: Option<(Made, Arc<pixels::Display>)>,
     compared: Option<([usize; 2], Compared)>,
+    /// A comparison that is under way.
+    comparing: Option<([usize; 2], Receiver<Compared>)>,
+    /// The interface, to be woken when a comparison is there.
+    context: Option<Context>,
     view: Option<(pixels::Place, Arc<ViewPicture>)>,
     layers: Vec<Layer>,
 }
@@ -87,7 +96,8 @@ impl Images {
     /// Those of [`output::load_within`].
     pub fn load(paths: &[PathBuf]) -> Result<Self> {
         let budget = Budget::default();
-        let read = |path: &PathBuf| Ok(Loaded { path: path.clone(), image: output::load_within(path, &budget)? });
+        let read =
+            |path: &PathBuf| Ok(Loaded { path: path.clone(), image: Arc::new(output::load_within(path, &budget)?) });
         Ok(Self::new(paths.iter().map(read).collect::<Result<_>>()?))
     }
 
@@ -106,6 +116,8 @@ impl Images {
             closes: false,
             display: None,
             compared: None,
+            comparing: None,
+            context: None,
             view: None,
             layers: Vec::new(),
         };
@@ -140,7 +152,7 @@ impl Images {
     pub fn add(&mut self, path: &Path) {
         match output::load_within(path, &Budget::default()) {
             Ok(image) => {
-                self.images.push(Loaded { path: path.to_owned(), image });
+                self.images.push(Loaded { path: path.to_owned(), image: Arc::new(image) });
                 if self.images.len() == 2 {
                     self.reference = 0;
                 }
@@ -152,18 +164,60 @@ impl Images {
     }
 
     /// How far the image is from the reference, in words where they cannot be compared; `None`
-    /// where there is no other image.
+    /// where there is no other image, and while large ones are being compared.
     pub fn comparison(&mut self) -> Option<Compared> {
         let pair = [self.shown, self.reference];
         if pair[0] == pair[1] {
             return None;
         }
         if self.compared.as_ref().is_none_or(|(of, _)| *of != pair) {
-            let [image, reference] = pair.map(|k| &self.images[k].image);
-            let compared = comparison::compare(image, reference, &CompareOptions::default());
-            self.compared = Some((pair, compared.map(Arc::new).map_err(|e| e.to_string())));
+            self.compared = Some((pair, self.compare(pair)?));
         }
         self.compared.as_ref().map(|(_, compared)| compared.clone())
+    }
+
+    /// Compares two images: large ones on a thread, so that the window answers meanwhile. `None`:
+    /// it is not there yet.
+    fn compare(&mut self, pair: [usize; 2]) -> Option<Compared> {
+        let [image, reference] = pair.map(|k| self.images[k].image.clone());
+        let run = move || {
+            let compared = comparison::compare(&image, &reference, &CompareOptions::default());
+            compared.map(Arc::new).map_err(|e| e.to_string())
+        };
+        let shown = self.image();
+        if u64::from(shown.width) * u64::from(shown.height) < LARGE {
+            return Some(run());
+        }
+
+        // the one that is under way, or one that is started
+        if let Some((_, compared)) = self.comparing.as_ref().filter(|(of, _)| *of == pair) {
+            return match compared.try_recv() {
+                Ok(compared) => Some(compared),
+                Err(TryRecvError::Empty) => None,
+                Err(TryRecvError::Disconnected) => Some(Err("the images could not be compared".into())),
+            };
+        }
+        let (sender, receiver) = channel();
+        let context = self.context.clone();
+        let started = std::thread::Builder::new().name("comparison".into()).spawn(move || {
+            // it may be that the window is gone
+            let _ = sender.send(run());
+            context.iter().for_each(Context::request_repaint);
+        });
+        match started {
+            Ok(_) => {
+                self.comparing = Some((pair, receiver));
+                None
+            }
+            Err(e) => Some(Err(format!("no thread to compare the images on: {e}"))),
+        }
+    }
+
+    /// Returns true while images are being compared.
+    pub fn is_comparing(&self) -> bool {
+        let pair = [self.shown, self.reference];
+        let is_there = self.compared.as_ref().is_some_and(|(of, _)| *of == pair);
+        !is_there && self.comparing.as_ref().is_some_and(|(of, _)| *of == pair)
     }
 
     /// Values of the pixel under the pointer: of an image, channel by channel.
@@ -186,6 +240,8 @@ impl Images {
 
     /// Runs a frame of the user interface.
     pub fn show_frame(&mut self, context: &Context) {
+        theme::apply(context);
+        self.context.get_or_insert_with(|| context.clone());
         panel::show(self, context);
     }
 
@@ -234,12 +290,14 @@ impl Images {
         if self.display.as_ref().is_none_or(|(of, _)| *of != made) {
             let display = match content {
                 Content::Image => pixels::Display::from_image(self.image(), &self.look),
-                Content::Difference | Content::Flip => match self.comparison()? {
-                    Ok(comparison) => {
+                Content::Difference | Content::Flip => match self.comparison() {
+                    // what was shown before stays until then
+                    None => return self.display.as_ref().map(|(_, display)| display.clone()),
+                    Some(Ok(comparison)) => {
                         let size = [self.image().width, self.image().height];
                         Ok(pixels::Display::from_comparison(&comparison, size, content, self.look.exposure))
                     }
-                    Err(e) => Err(e),
+                    Some(Err(e)) => Err(e),
                 },
             };
             self.view = None;

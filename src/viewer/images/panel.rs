@@ -158,6 +158,9 @@ fn values(app: &mut Images, ui: &mut Ui) {
         Some(Err(e)) => {
             ui.label(e);
         }
+        None if app.is_comparing() => {
+            ui.label("comparing with the reference …");
+        }
         None => {}
     }
     ui.weak("1 to 9: image   Space: the other one   D: difference   L: FLIP   + and -: exposure   F: fit   wheel: zoom   drag: move");

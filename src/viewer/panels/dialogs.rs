@@ -21,14 +21,15 @@ pub const CONTROLS: &[(&str, &str)] = &[
     ("Wheel, pinch", "come closer to what is under the pointer, go back"),
     ("W A S D, Q E", "fly forward, left, back, right, down and up (Shift: faster)"),
     ("Arrow keys", "orbit"),
-    ("Click", "describe what is under the pointer"),
+    ("Click", "select what is under the pointer"),
+    ("H, Shift + H", "hide what is selected, show it alone; once more: all"),
     ("Double click", "come closer to what is under the pointer, and orbit it"),
-    ("F, Home", "frame the whole scene, return to the opening view"),
+    ("F, Home", "frame the whole scene (Shift + F: what is selected), opening view"),
     ("Ctrl + 1, 3, 7", "view from the front, the right, the top (Shift: from the other side)"),
     ("B", "keep the camera"),
     ("U", "turntable"),
     ("1 to 5", "fast, balanced, quality, path, converged AO"),
-    ("X", "split: two images side by side; drag the line between them"),
+    ("X", "two images side by side, with a line to drag"),
     ("Space", "flicker: show the other image"),
     ("T", "compare with the truth"),
     ("P", "play or stop the animation"),
@@ -41,6 +42,9 @@ pub const CONTROLS: &[(&str, &str)] = &[
     ("?, Escape", "this help, close a window"),
 ];
 
+/// Width of a window from which help has two columns, and of a column, points.
+const TWO_COLUMNS: f32 = 1100.0;
+const HELP_WIDTH: f32 = 510.0;
 /// Greatest side of a render, pixels.
 const MAX_RENDER_SIDE: u32 = 16_384;
 
@@ -49,25 +53,36 @@ pub fn show(app: &mut App, context: &Context) {
     if context.input(|i| i.key_pressed(Key::Escape)) {
         (app.dialog, app.shows_help) = (None, false);
     }
+
+    // keys and mouse
     let mut open = app.shows_help;
     egui::Window::new("Keys and mouse")
         .open(&mut open)
         .collapsible(false)
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui| {
-            // with large text the window is low
-            let height = (context.content_rect().height() - 80.0).clamp(100.0, 500.0);
-            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                egui::Grid::new("controls").num_columns(2).striped(true).show(ui, |ui| {
-                    for (input, effect) in CONTROLS {
-                        ui.strong(*input);
-                        ui.label(*effect);
+            // with large text the window is low and narrow
+            let screen = context.content_rect();
+            let height = (screen.height() - 80.0).clamp(100.0, 600.0);
+            let columns = if screen.width() > TWO_COLUMNS { 2 } else { 1 };
+            let rows = CONTROLS.len().div_ceil(columns);
+            let width = HELP_WIDTH * columns as f32;
+            ui.set_min_width(width.min(screen.width() - 60.0));
+            egui::ScrollArea::both().max_height(height).show(ui, |ui| {
+                egui::Grid::new("controls").num_columns(2 * columns).spacing([16.0, 6.0]).show(ui, |ui| {
+                    for row in 0..rows {
+                        for (input, effect) in CONTROLS.iter().skip(row).step_by(rows) {
+                            ui.strong(*input);
+                            ui.label(*effect);
+                        }
                         ui.end_row();
                     }
                 });
             });
         });
     app.shows_help = open;
+
+    // a file that was chosen, and a dialog that is open
     if let Some(Poll::Ready(chosen)) = app.browsing.as_ref().map(Browsing::poll) {
         app.browsing = None;
         match chosen {
@@ -92,6 +107,7 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         Dialog::Save(_) => ("Save the image", "A file: .png, .jpg or .webp as shown, .exr with all channels", "Save"),
         Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
+        Dialog::Export(_) => ("Export the scene", "A file: .glb, .gltf", "Export"),
         Dialog::Render(..) => (
             "Render this view",
             "A file: .png, .exr, .jpg, .webp, .apng, .mp4, .webm, .gif or frames.####.png",
@@ -183,7 +199,7 @@ fn render_numbers(app: &App, ui: &mut Ui, wanted: &mut RenderWanted) {
 }
 
 fn act(app: &mut App, dialog: Dialog) {
-    if let Dialog::Save(text) | Dialog::SaveSettings(text) | Dialog::Render(text, _) = &dialog
+    if let Dialog::Save(text) | Dialog::SaveSettings(text) | Dialog::Export(text) | Dialog::Render(text, _) = &dialog
         && let Some(scene) = &app.scene
     {
         let mut plan = FilePlan::default();
@@ -202,6 +218,7 @@ fn act(app: &mut App, dialog: Dialog) {
         Dialog::Save(text) => {
             app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) })
         }
+        Dialog::Export(text) => app.export(text.trim()),
         Dialog::Render(text, wanted) => app.render(text.trim(), &wanted),
         Dialog::LoadSettings(text) => match app.load_settings(Path::new(text.trim())) {
             Ok(()) => app.report(format!("loaded {}", text.trim()), false),

@@ -2,6 +2,7 @@
 
 use egui::{Button, KeyboardShortcut, Ui};
 
+use crate::renderer::interactive::ViewPicture;
 use crate::scene::builtin;
 use crate::viewer::app::{App, Arrangement};
 use crate::viewer::camera::AxisView;
@@ -178,7 +179,7 @@ fn view(app: &mut App, ui: &mut Ui) {
         }
     });
     ui.menu_button("Size of text", |ui| {
-        for percent in [100u16, 125, 150, 200] {
+        for percent in [100u16, 125, 150, 200, 250, 300] {
             let factor = f32::from(percent) / 100.0;
             if ui.radio(ui.ctx().zoom_factor() == factor, format!("{percent} %")).clicked() {
                 ui.ctx().set_zoom_factor(factor);
@@ -224,20 +225,49 @@ fn camera(app: &mut App, ui: &mut Ui) {
     }
     ui.separator();
     if item(ui, "Keep this camera", None, "B") {
-        keep_camera(app);
+        keep_camera(app, ui.ctx());
     }
-    for (name, camera) in app.bookmarks.clone() {
-        if item(ui, &name, None, "") {
+    for (name, camera, picture) in app.bookmarks.clone() {
+        let button = match &picture {
+            Some(picture) => Button::image_and_text((picture.id(), picture.size_vec2()), &name),
+            None => Button::new(&name),
+        };
+        if ui.add(button).clicked() {
+            ui.close();
             app.set_camera(camera, None);
         }
     }
 }
 
-/// Keeps the camera as a bookmark.
-pub fn keep_camera(app: &mut App) {
+/// Size that a picture of a bookmark fits into, pixels.
+const THUMBNAIL: [usize; 2] = [96, 64];
+
+/// A picture, reduced to what fits into a menu: each pixel is the mean of those that it covers.
+fn thumbnail(picture: &ViewPicture) -> Option<egui::ColorImage> {
+    let [width, height] = picture.size.map(|n| n as usize);
+    let factor = width.div_ceil(THUMBNAIL[0]).max(height.div_ceil(THUMBNAIL[1])).max(1);
+    let size = [width / factor, height / factor];
+    if size.contains(&0) || picture.rgba.len() < 4 * width * height {
+        return None;
+    }
+    let mean = |k: usize| {
+        let (x, y) = (k % size[0] * factor, k / size[0] * factor);
+        let covered = (0..factor * factor).map(|i| 4 * ((y + i / factor) * width + x + i % factor));
+        let mut sums = [0usize; 3];
+        covered.for_each(|at| (0..3).for_each(|c| sums[c] += usize::from(picture.rgba[at + c])));
+        let [r, g, b] = sums.map(|sum| (sum / (factor * factor)) as u8);
+        egui::Color32::from_rgb(r, g, b)
+    };
+    Some(egui::ColorImage::new(size, (0..size[0] * size[1]).map(mean).collect()))
+}
+
+/// Keeps the camera as a bookmark, with a small picture of what it sees.
+pub fn keep_camera(app: &mut App, context: &egui::Context) {
     if let Some(camera) = app.shown_camera() {
         let name = format!("Kept camera {}", app.bookmarks.len() + 1);
-        app.bookmarks.push((name.clone(), camera));
+        let picture = app.picture(false).and_then(|picture| thumbnail(&picture));
+        let picture = picture.map(|image| context.load_texture(&name, image, egui::TextureOptions::LINEAR));
+        app.bookmarks.push((name.clone(), camera, picture));
         app.report(format!("{name}: in the menu Camera"), false);
     }
 }

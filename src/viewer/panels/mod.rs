@@ -4,17 +4,21 @@ mod dialogs;
 mod editor;
 mod menu;
 mod performance;
+mod scene;
 mod side;
+mod slider;
 mod status;
 mod viewport;
 
 pub(super) use menu::shortcuts;
 
 use super::app::App;
+use super::theme;
 
 /// Runs a frame of the user interface: takes over what has happened, shows everything, requests
 /// what has changed.
 pub fn show_frame(app: &mut App, context: &egui::Context) {
+    theme::apply(context);
     app.begin_frame(context);
     show(app, context);
     app.end_frame(context);

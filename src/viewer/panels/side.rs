@@ -1,57 +1,67 @@
-//! The panel at the side: techniques, settings, light, animation, device, performance, selection.
+//! The panel at the side: the scene, what is shown of it, light, settings, camera, animation,
+//! device.
 
-use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
+use egui::{CollapsingHeader, ComboBox, Response, Ui};
 
-use super::{editor, performance};
+use super::slider::Scale;
+use super::{editor, performance, scene, slider};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::Camera;
 use crate::scene::environments::BuiltinEnvironment;
 use crate::scene::load::{GeometryOptions, NormalSource, Projection, UpAxis};
 use crate::scene::settings::variant_index;
-use crate::settings::{Capability, Length, Setting};
+use crate::settings::{Capability, Length, Level, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Arrangement, Second};
 use crate::viewer::dialog::{Dialog, RenderedMotion};
 use crate::viewer::rounding::round_length;
 use crate::viewer::technique::{GROUPS, Technique};
 
-/// Shows all sections.
+/// Shows all sections, in the order in which they are used.
 pub fn show(app: &mut App, ui: &mut Ui) {
-    section(ui, "Images", true, |ui| images(app, ui));
-    section(ui, "Ambient occlusion", true, |ui| occlusion(app, ui));
-    section(ui, "Comparison with the truth", false, |ui| truth(app, ui));
-    section(ui, "Real-time frames", false, |ui| frames(app, ui));
-    section(ui, "Paths", false, |ui| paths(app, ui));
-    section(ui, "Picture", false, |ui| {
-        editor::edit(
-            ui,
-            app.settings.picture.editable(),
-            &serde_json::json!({ "tone_map": "linear", "exposure": 0.0 }),
-        );
+    section(ui, "Scene", true, |ui| {
+        scene::objects(app, ui);
+        ui.separator();
+        scene::selection(app, ui);
+        part(ui, "Scene file", |ui| scene_file(app, ui));
     });
-    section(ui, "Scene file", false, |ui| {
-        let settings = app.settings.scene.editable().into_iter().filter(|s| s.name != "variant").collect();
-        editor::edit(ui, settings, &serde_json::json!({ "mtl_dissolve": "alpha" }));
-        variant(app, ui);
-        scene_of_file(app, ui);
-        geometry(app, ui);
-    });
+    section(ui, "View", true, |ui| view(app, ui));
     section(ui, "Light", false, |ui| light(app, ui));
+    section(ui, "Ambient occlusion", true, |ui| occlusion(app, ui));
+    section(ui, "Quality", false, |ui| quality(app, ui));
     section(ui, "Camera", false, |ui| camera(app, ui));
     section(ui, "Animation", false, |ui| animation(app, ui));
-    section(ui, "Device", false, |ui| device(app, ui));
-    section(ui, "Performance", false, |ui| performance::show(app, ui));
-    section(ui, "Selection", true, |ui| selection(app, ui));
+    section(ui, "Device", false, |ui| {
+        device(app, ui);
+        part(ui, "Performance", |ui| performance::show(app, ui));
+    });
     section(ui, "Messages", false, |ui| {
         for (_, text, is_error) in &app.messages {
             let text = egui::RichText::new(text);
             ui.label(if *is_error { text.color(ui.visuals().warn_fg_color) } else { text });
         }
     });
+    section(ui, "Research", false, |ui| research(app, ui));
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, content: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(title).default_open(is_open).show(ui, content);
+    let text = egui::RichText::new(title).strong();
+    CollapsingHeader::new(text).id_salt(title).default_open(is_open).show(ui, content);
+    ui.add_space(2.0);
+}
+
+/// A part of a section, which is closed at first.
+fn part(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(title).default_open(false).show(ui, content);
+}
+
+/// The meaning of the file, and which part of it is shown.
+fn scene_file(app: &mut App, ui: &mut Ui) {
+    let settings = app.settings.scene.editable().into_iter().filter(|s| s.name != "variant").collect();
+    editor::edit(ui, settings, &serde_json::json!({ "mtl_dissolve": "alpha" }));
+    variant(app, ui);
+    scene_of_file(app, ui);
+    geometry(app, ui);
 }
 
 /// A list of techniques. Returns the one that was chosen.
@@ -67,7 +77,8 @@ fn choose_technique(
         let heading = ui.label(label);
         // all of it within the window, also with large text
         let height = (0.6 * ui.ctx().content_rect().height()).min(420.0);
-        let combo = ComboBox::from_id_salt(label).selected_text(shown).width(170.0).height(height);
+        let combo =
+            ComboBox::from_id_salt(label).selected_text(shown).width(ui.available_width().min(170.0)).height(height);
         let response = combo.show_ui(ui, |ui| {
             let all = Technique::all();
             for (k, title) in GROUPS.iter().enumerate() {
@@ -89,26 +100,40 @@ fn choose_technique(
     chosen
 }
 
-fn images(app: &mut App, ui: &mut Ui) {
+/// The image that is shown, and what it is compared with.
+fn view(app: &mut App, ui: &mut Ui) {
     let shown = app.first.label();
-    if let Some(technique) = choose_technique(ui, "First image", &shown, Some(app.first), &|_| true) {
+    if let Some(technique) = choose_technique(ui, "Show", &shown, Some(app.first), &|_| true) {
         app.first = technique;
     }
-    let shown = app.title(true);
-    let current = if let Second::Technique(t) = app.second { Some(t) } else { None };
-    if let Some(technique) = choose_technique(ui, "Second image", &shown, current, &|_| true) {
-        app.second = Second::Technique(technique);
+    let mut split = app.arrangement != Arrangement::Single;
+    let help = "Another image beside it (X): the truth, unless another is chosen below";
+    if ui.checkbox(&mut split, "Compare").on_hover_text(help).changed() {
+        super::menu::toggle_split(app);
     }
-    ui.horizontal(|ui| {
-        ui.selectable_value(&mut app.second, Second::Truth, "Truth")
-            .on_hover_text("The second image is the truth of the first");
-        ui.selectable_value(&mut app.second, Second::HeatMap, "Heat map")
-            .on_hover_text("The second image is FLIP of the first against the truth");
-        let mut split = app.arrangement != Arrangement::Single;
-        if ui.checkbox(&mut split, "Split").on_hover_text("Both images side by side (X)").changed() {
-            super::menu::toggle_split(app);
+    part(ui, "Comparison", |ui| {
+        let shown = app.title(true);
+        let current = if let Second::Technique(t) = app.second { Some(t) } else { None };
+        if let Some(technique) = choose_technique(ui, "Second image", &shown, current, &|_| true) {
+            app.second = Second::Technique(technique);
         }
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut app.second, Second::Truth, "Truth")
+                .on_hover_text("The second image is the truth of the first");
+            ui.selectable_value(&mut app.second, Second::HeatMap, "Heat map")
+                .on_hover_text("The second image is FLIP of the first against the truth");
+        });
+        truth(app, ui);
     });
+}
+
+/// Returns true for settings that are for research and comparisons.
+fn is_research(setting: &Setting) -> bool {
+    setting.level == Level::Research
+}
+
+/// How much is rendered: of frames in real time, and of paths.
+fn quality(app: &mut App, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let mut holds = app.frame_rate.is_some();
         let response = ui.checkbox(&mut holds, "Hold a frame rate").on_hover_text(
@@ -122,6 +147,26 @@ fn images(app: &mut App, ui: &mut Ui) {
             ui.add(drag).labelled_by(response.id);
         }
     });
+    frames(app, ui, &|s| !is_research(s));
+    if follows_light(app) {
+        ui.separator();
+        paths(app, ui, &|s| !is_research(s));
+    }
+}
+
+/// Settings that are for research and comparisons, of all that is rendered.
+fn research(app: &mut App, ui: &mut Ui) {
+    ui.weak("For comparisons of methods. The pipelines of Larsen (2019) are in the list of View.");
+    frames(app, ui, &is_research);
+    let ao = app.settings.integrators.ao.editable().into_iter().filter(is_research).collect();
+    editor::edit(ui, ao, &serde_json::json!({ "ao_normal": "geometric" }));
+    paths(app, ui, &is_research);
+    tracer_options(app, ui, &is_research);
+}
+
+/// Whether the first image follows light from surface to surface.
+fn follows_light(app: &App) -> bool {
+    matches!(app.first, Technique::Still(i) | Technique::Frames(i) if !i.can(Capability::AmbientVisibility))
 }
 
 fn occlusion(app: &mut App, ui: &mut Ui) {
@@ -139,16 +184,17 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
             ao.ao_radius = is_limited.then(|| Length::Units(round_length(0.1 * size)));
         }
         if let (true, Some(Length::Units(radius))) = (is_limited, &mut ao.ao_radius) {
-            ui.add(length(radius, size)).labelled_by(check.id);
+            length(ui, &check, radius, size);
         }
     });
     ui.horizontal(|ui| {
         let mut falls_off = ao.ao_falloff.is_some();
         let check = ui
             .checkbox(&mut falls_off, "Falloff")
-            .on_hover_text(
-                "Hits occlude by half at this distance, by a quarter at twice the distance; without it wholly at any distance, the cheapest\n--ao-falloff C: a hit at distance d occludes by C^-d",
-            );
+            .on_hover_text(format!(
+                "Hits occlude by half at this distance, by a quarter at twice the distance; without it wholly at any distance, the cheapest\n--ao-falloff C: a hit at distance d occludes by C^-d{}",
+                ao.ao_falloff.map_or(String::new(), |falloff| format!(", C = {}", in_short(falloff)))
+            ));
         if check.changed() {
             // corners keep their darkness, what is at the radius has lost most of its own
             let half = if ao.radius().is_finite() { 0.5 * ao.radius() } else { 0.05 * size };
@@ -156,27 +202,23 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
         }
         if let Some(falloff) = &mut ao.ao_falloff {
             let mut half = half_distance(*falloff).min(1e3 * size);
-            let slider = ui.add(length(&mut half, size)).labelled_by(check.id);
-            if slider.changed() {
+            if length(ui, &check, &mut half, size) {
                 *falloff = falloff_of(half);
             }
         }
     });
 
     // options that have no control of their own; views have one occlusion ray a camera ray
-    if let Some(falloff) = ao.ao_falloff {
-        ui.weak(format!("Occlusion is halved at this distance: --ao-falloff {}", in_short(falloff)));
-    }
-    let rest =
-        ao.editable().into_iter().filter(|s| !["ao_radius", "ao_falloff", "ao_rays"].contains(&s.name)).collect();
-    editor::edit(ui, rest, &serde_json::json!({ "ao_normal": "geometric" }));
+    let has_control = |s: &Setting| ["ao_radius", "ao_falloff", "ao_rays"].contains(&s.name);
+    let rest = ao.editable().into_iter().filter(|s| !has_control(s) && !is_research(s)).collect();
+    editor::edit(ui, rest, &serde_json::Value::Null);
 }
 
-/// A slider of a length in a scene of this size. A value beyond its ends stays as it is until it is
-/// dragged.
-fn length(value: &mut f64, size: f64) -> Slider<'_> {
-    let slider = Slider::new(value, round_length(1e-3 * size)..=round_length(2.0 * size)).logarithmic(true);
-    slider.clamping(SliderClamping::Edits).suffix(" units")
+/// Shows a slider of a length in a scene of this size. A value beyond its ends stays as it is until
+/// it is changed. Returns true if it was.
+fn length(ui: &mut Ui, heading: &Response, value: &mut f64, size: f64) -> bool {
+    let range = round_length(1e-3 * size)..=round_length(2.0 * size);
+    slider::show(ui, heading, value, range, Scale::Logarithmic, " units")
 }
 
 /// The falloff C at which a hit at distance `half` occludes by half: C^-half is 1/2.
@@ -266,7 +308,7 @@ fn applicable<'a>(settings: Vec<Setting<'a>>, integrator: &dyn Integrator, hidde
     settings.into_iter().filter(|s| s.applies.includes(&named) && !hidden.contains(&s.name)).collect()
 }
 
-fn frames(app: &mut App, ui: &mut Ui) {
+fn frames(app: &mut App, ui: &mut Ui, holds: &dyn Fn(&Setting) -> bool) {
     let settings = app.first.settings(&app.settings);
     if settings.realtime_setting().is_none() {
         ui.label("The first image is a still; these settings are for frames in real time.");
@@ -277,26 +319,36 @@ fn frames(app: &mut App, ui: &mut Ui) {
         values["filter"] = values["filter"]["kind"].take();
         values
     });
-    const HIDDEN: [&str; 10] =
-        ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "lead_in", "technique", "show"];
-    let all = applicable(app.settings.frames.editable(), &crate::integrators::ao::AmbientOcclusion, &HIDDEN);
+    const HIDDEN: [&str; 11] = [
+        "preset",
+        "frames",
+        "fps",
+        "animate",
+        "time",
+        "camera_path",
+        "orbit",
+        "warm_up",
+        "lead_in",
+        "technique",
+        "show",
+    ];
+    let mut all = applicable(app.settings.frames.editable(), &crate::integrators::ao::AmbientOcclusion, &HIDDEN);
+    all.retain(|s| holds(s));
     editor::edit(ui, all, &effective.unwrap_or_default());
 }
 
-fn paths(app: &mut App, ui: &mut Ui) {
+fn paths(app: &mut App, ui: &mut Ui, holds: &dyn Fn(&Setting) -> bool) {
     let integrator = match app.first {
         Technique::Still(integrator) | Technique::Frames(integrator)
             if !integrator.can(Capability::AmbientVisibility) =>
         {
             integrator.get()
         }
-        _ => {
-            ui.label("For path, direct, lit, whitted and ao-sky.");
-            &crate::integrators::path::kinds::PATH as &dyn Integrator
-        }
+        _ => &crate::integrators::path::kinds::PATH as &dyn Integrator,
     };
     let effective = crate::integrators::path::settings::PathSettings::defaults().into();
-    let all = applicable(app.settings.integrators.path.editable(), integrator, &[]);
+    let mut all = applicable(app.settings.integrators.path.editable(), integrator, &[]);
+    all.retain(|s| holds(s));
     editor::edit(ui, all, &effective);
 }
 
@@ -307,6 +359,12 @@ fn light(app: &mut App, ui: &mut Ui) {
     }
 
     environment(app, ui);
+    ui.separator();
+
+    // how bright, and how it becomes colours
+    let tone_map = if app.first.is_seen_by_camera() { "agx" } else { "linear" };
+    let effective = serde_json::json!({ "tone_map": tone_map, "exposure": 0.0 });
+    editor::edit(ui, app.settings.picture.editable(), &effective);
     ui.separator();
 
     // a light as text
@@ -363,6 +421,12 @@ fn environment(app: &mut App, ui: &mut Ui) {
                     chosen = Some(name.to_owned());
                 }
             }
+            // files that were used before
+            for file in app.remembered.iter().flat_map(|remembered| &remembered.environments) {
+                if ui.selectable_label(current == *file, short_name(file)).on_hover_text(file).clicked() {
+                    chosen = Some(file.clone());
+                }
+            }
         });
         list.response.labelled_by(heading.id);
         if ui
@@ -390,6 +454,7 @@ fn environment(app: &mut App, ui: &mut Ui) {
     ui.data_mut(|d| d.insert_temp(id, (current, text)));
     if let Some(chosen) = chosen {
         app.lighting.environment = Some(chosen).filter(|text| !text.is_empty());
+        app.remember_environment();
         if app.lighting.environment.is_none() {
             (app.lighting.environment_turn, app.lighting.environment_scale) = (None, None);
         }
@@ -400,16 +465,14 @@ fn environment(app: &mut App, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let heading = ui.label("Turn").on_hover_text("Counter-clockwise from above; also Shift + right drag");
             let mut turn = app.lighting.environment_turn.unwrap_or(0.0);
-            let slider = Slider::new(&mut turn, -180.0..=180.0).clamping(SliderClamping::Edits).suffix("°");
-            if ui.add(slider).labelled_by(heading.id).changed() {
+            if slider::show(ui, &heading, &mut turn, -180.0..=180.0, Scale::Linear, "°") {
                 app.lighting.environment_turn = Some(turn).filter(|turn| *turn != 0.0);
             }
         });
         ui.horizontal(|ui| {
             let heading = ui.label("Brightness").on_hover_text("Stops: each doubles the environment's radiance");
             let mut stops = app.lighting.environment_scale.unwrap_or(1.0).max(1e-6).log2();
-            let slider = Slider::new(&mut stops, -8.0..=8.0).clamping(SliderClamping::Edits).suffix(" EV");
-            if ui.add(slider).labelled_by(heading.id).changed() {
+            if slider::show(ui, &heading, &mut stops, -8.0..=8.0, Scale::Linear, " EV") {
                 app.lighting.environment_scale = Some(stops.exp2()).filter(|scale| *scale != 1.0);
             }
         });
@@ -429,8 +492,7 @@ fn camera(app: &mut App, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let heading = ui.label("Field of view");
             // a camera of a file may have another
-            let slider = Slider::new(&mut degrees, 5.0..=120.0).clamping(SliderClamping::Edits).suffix("°");
-            if ui.add(slider).labelled_by(heading.id).changed() {
+            if slider::show(ui, &heading, &mut degrees, 5.0..=120.0, Scale::Linear, "°") {
                 app.leave_followed();
                 app.control.iter_mut().for_each(|control| control.set_fov_y(degrees.to_radians()));
             }
@@ -441,11 +503,11 @@ fn camera(app: &mut App, ui: &mut Ui) {
     let Some(control) = &mut app.control else { return };
     ui.horizontal(|ui| {
         let heading = ui.label("Speed of flight");
-        ui.add(Slider::new(&mut control.speed, 0.01..=10.0).logarithmic(true)).labelled_by(heading.id);
+        slider::show(ui, &heading, &mut control.speed, 0.01..=10.0, Scale::Logarithmic, "");
     });
     ui.horizontal(|ui| {
         let heading = ui.label("Turntable");
-        ui.add(Slider::new(&mut app.turntable, -2.0..=2.0).suffix(" rad/s")).labelled_by(heading.id);
+        slider::show(ui, &heading, &mut app.turntable, -2.0..=2.0, Scale::Linear, " rad/s");
     });
     if ui
         .button("Copy the camera")
@@ -521,7 +583,7 @@ fn scene_of_file(app: &mut App, ui: &mut Ui) {
     let shown = app.gltf_scene.clone().unwrap_or_else(|| "the file's choice".to_owned());
     let mut chosen = None;
     ui.horizontal(|ui| {
-        let heading = ui.label("Scene");
+        let heading = ui.label("Scene of the file");
         let combo = ComboBox::from_id_salt("scene of the file").selected_text(shown);
         let response = combo.show_ui(ui, |ui| {
             for (k, name) in names.iter().enumerate() {
@@ -632,11 +694,11 @@ fn animation(app: &mut App, ui: &mut Ui) {
     });
     ui.horizontal(|ui| {
         let heading = ui.label("Time");
-        ui.add(Slider::new(&mut playback.time, 0.0..=duration.max(1e-3)).suffix(" s")).labelled_by(heading.id);
+        slider::show(ui, &heading, &mut playback.time, 0.0..=duration.max(1e-3), Scale::Linear, " s");
     });
     ui.horizontal(|ui| {
         let heading = ui.label("Speed");
-        ui.add(Slider::new(&mut playback.speed, 0.05..=4.0).logarithmic(true)).labelled_by(heading.id);
+        slider::show(ui, &heading, &mut playback.speed, 0.05..=4.0, Scale::Logarithmic, "");
     });
 }
 
@@ -694,40 +756,14 @@ fn device(app: &mut App, ui: &mut Ui) {
         response.response.labelled_by(heading.id);
     });
 
-    // options of the compute tracer
-    let is_compute = app.device.tracer.0 == "compute";
-    let hidden = ["tracer", "device", "validation"];
-    let rest: Vec<Setting> = app.device_settings.editable().into_iter().filter(|s| !hidden.contains(&s.name)).collect();
-    ui.add_enabled_ui(is_compute, |ui| editor::edit(ui, rest, &serde_json::json!({})));
+    tracer_options(app, ui, &|s| !is_research(s));
 }
 
-fn selection(app: &App, ui: &mut Ui) {
-    let Some(pick) = &app.pick else {
-        ui.label("Click into the image.");
-        return;
-    };
-    let name = |(index, name): &(usize, String)| {
-        if name.is_empty() { format!("{index}") } else { format!("{index} '{name}'") }
-    };
-    let textures = app.scene.as_ref().map(|s| s.textures.as_slice()).unwrap_or_default();
-    let textures: Vec<_> =
-        pick.textures.iter().filter_map(|&t| textures.get(t).map(|n| format!("{t} '{n}'"))).collect();
-    // names may be long: they are broken, and do not make the panel wider
-    let width = (ui.available_width() - 90.0).max(60.0);
-    egui::Grid::new("selection").num_columns(2).striped(true).max_col_width(width).show(ui, |ui| {
-        let rows = [
-            ("Position", format!("{:.4}, {:.4}, {:.4}", pick.position.x, pick.position.y, pick.position.z)),
-            ("Distance", format!("{:.4}", pick.distance)),
-            ("Instance", name(&pick.instance)),
-            ("Mesh", name(&pick.mesh)),
-            ("Primitive", format!("{} of {}", pick.primitive.0, pick.primitive.1)),
-            ("Material", name(&pick.material)),
-            ("Textures", if textures.is_empty() { "none".into() } else { textures.join(", ") }),
-        ];
-        for (title, text) in rows {
-            ui.label(title);
-            ui.add(egui::Label::new(text).wrap());
-            ui.end_row();
-        }
-    });
+/// Options of the compute tracer.
+fn tracer_options(app: &mut App, ui: &mut Ui, holds: &dyn Fn(&Setting) -> bool) {
+    let is_compute = app.device.tracer.0 == "compute";
+    let hidden = ["tracer", "device", "validation"];
+    let mut rest = app.device_settings.editable();
+    rest.retain(|s| !hidden.contains(&s.name) && holds(s));
+    ui.add_enabled_ui(is_compute, |ui| editor::edit(ui, rest, &serde_json::json!({})));
 }

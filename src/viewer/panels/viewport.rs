@@ -11,8 +11,10 @@ use crate::viewer::app::{App, Arrangement};
 use crate::viewer::camera::AxisView;
 use crate::viewer::dialog::Dialog;
 use crate::viewer::layer::Layer;
+use crate::viewer::remembered::Hint;
 use crate::viewer::request::{PickPurpose, Task};
 use crate::viewer::technique::Technique;
+use crate::viewer::theme;
 
 /// Width of the line between two images that can be dragged, points.
 const HANDLE: f32 = 10.0;
@@ -55,6 +57,7 @@ pub fn keys(app: &mut App, context: &Context) {
     for (key, technique) in techniques {
         if let (true, Some(technique)) = (pressed(key), technique) {
             app.first = technique;
+            app.learn(Hint::Technique);
         }
     }
 
@@ -73,8 +76,17 @@ pub fn keys(app: &mut App, context: &Context) {
     }
 
     // camera and time
-    if pressed(Key::F) {
-        menu::frame_all(app);
+    let shifted = |key| context.input(|i| i.key_pressed(key) && i.modifiers.shift_only());
+    match app.selected {
+        Some(object) if shifted(Key::F) => app.frame_object(object),
+        Some(object) if shifted(Key::H) && app.settings.scene.only.is_empty() => app.isolate(object),
+        _ if shifted(Key::H) => app.show_all_objects(),
+        Some(object) if pressed(Key::H) && !context.input(|i| i.modifiers.shift) => {
+            let is_hidden = app.hidden_objects().get(object).copied().unwrap_or_default();
+            app.hide(object, !is_hidden);
+        }
+        _ if pressed(Key::F) => menu::frame_all(app),
+        _ => {}
     }
     if pressed(Key::Home) {
         menu::open_view(app);
@@ -91,7 +103,7 @@ pub fn keys(app: &mut App, context: &Context) {
         }
     }
     if pressed(Key::B) {
-        menu::keep_camera(app);
+        menu::keep_camera(app, context);
     }
     if pressed(Key::U) {
         app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
@@ -125,6 +137,9 @@ fn fly(app: &mut App, context: &Context, is_free: bool) {
         return;
     }
     app.leave_followed();
+    if held != [0.0; 3] {
+        app.ask_how_near();
+    }
     let Some(control) = &mut app.control else { return };
     context.request_repaint();
     if held != [0.0; 3] {
@@ -166,8 +181,26 @@ pub fn show(app: &mut App, ui: &mut Ui) {
         }
         None => layer(app, app.shows_second, area),
     }
+    outline(app, ui, rect, split);
     titles(app, ui, rect, split);
+    hints(app, ui, rect);
     notices(app, ui, rect);
+}
+
+/// A line around what is selected.
+fn outline(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
+    let Some(outline) = app.outline() else { return };
+    // the second image may be of another moment
+    let right = split.unwrap_or(if app.shows_second { rect.left() } else { rect.right() });
+    let painter = ui.painter().with_clip_rect(Rect::from_min_max(rect.min, Pos2::new(right, rect.bottom())));
+    let at = |[x, y]: [f32; 2]| rect.min + rect.size() * Vec2::new(x, y);
+    let accent = theme::accent(ui.ctx());
+    for (width, colour) in [(3.5, Color32::from_black_alpha(110)), (1.8, accent)] {
+        for line in &outline.lines {
+            let points: Vec<Pos2> = line.iter().copied().map(at).collect();
+            painter.add(egui::Shape::line(points, Stroke::new(width, colour)));
+        }
+    }
 }
 
 /// The line between two images; returns its position.
@@ -204,6 +237,9 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
     if delta != Vec2::ZERO || scroll != 0.0 || pinch != 1.0 {
         app.leave_followed();
     }
+
+    let learnt = [(delta != Vec2::ZERO, Hint::Orbit), (scroll != 0.0 || pinch != 1.0, Hint::Zoom)];
+    learnt.iter().filter(|(is_done, _)| *is_done).for_each(|(_, hint)| app.learn(*hint));
 
     // drags and the wheel
     let Some(control) = &mut app.control else { return };
@@ -265,12 +301,42 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
         Some(x) => {
             text(rect.left_top() + margin, Align2::LEFT_TOP, title(false));
             text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, title(true));
-            if let Some(c) = &app.comparison {
-                let error = format!("RMSE {:.4}, bias {:+.4} against {}", c.rmse, c.bias, app.truth().label());
-                text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
-            }
         }
         None => text(rect.left_top() + margin, Align2::LEFT_TOP, title(app.shows_second)),
+    }
+    if let Some(c) = &app.comparison {
+        let (first, truth) = (app.first.label(), app.truth().label());
+        let error = format!("{first} against {truth}: RMSE {:.4}, bias {:+.4}, FLIP {:.4}", c.rmse, c.bias, c.flip);
+        text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
+    }
+}
+
+/// Shows at the first time how to begin; each line goes once it has been done.
+fn hints(app: &mut App, ui: &Ui, rect: Rect) {
+    let Some(remembered) = app.remembered.as_mut().filter(|_| app.control.is_some()) else { return };
+    let needed: Vec<Hint> = Hint::ALL.into_iter().filter(|hint| remembered.needs(*hint)).collect();
+    if needed.is_empty() {
+        return;
+    }
+    let mut is_done = false;
+    egui::Area::new("hints".into()).fixed_pos(rect.left_top() + Vec2::new(10.0, 44.0)).show(ui.ctx(), |ui| {
+        egui::Frame::popup(ui.style()).show(ui, |ui| {
+            egui::Grid::new("hints").num_columns(2).show(ui, |ui| {
+                for hint in &needed {
+                    let [input, effect] = hint.text();
+                    ui.strong(input);
+                    ui.label(effect);
+                    ui.end_row();
+                }
+                ui.strong("?");
+                ui.label("all keys");
+                ui.end_row();
+            });
+            is_done = ui.button("Got it").clicked();
+        });
+    });
+    if is_done {
+        needed.into_iter().for_each(|hint| remembered.learn(hint));
     }
 }
 

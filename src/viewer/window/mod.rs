@@ -1,6 +1,7 @@
 //! The viewer, and images, in a window.
 
 mod cpu;
+mod icon;
 mod vulkan;
 
 use std::sync::Arc;
@@ -14,7 +15,9 @@ use egui_winit::winit::window::{Window, WindowId};
 
 use super::app::App;
 use super::layer::Layer;
+use super::options::DEFAULT_SIZE;
 use super::painter::Painted;
+use super::remembered::Remembered;
 use super::request::{EventSender, Mailbox};
 use super::{Painter, ViewOptions, panels, worker};
 use crate::error::{Error, Result};
@@ -43,6 +46,9 @@ pub trait WindowApp {
 
     /// Tells the user of an error.
     fn report(&mut self, message: String);
+
+    /// Notes the size of the window, in points of the display, and whether it fills the screen.
+    fn resized(&mut self, _size: [u32; 2], _is_maximized: bool) {}
 }
 
 impl WindowApp for App {
@@ -69,6 +75,14 @@ impl WindowApp for App {
     fn report(&mut self, message: String) {
         App::report(self, message, true);
     }
+
+    fn resized(&mut self, size: [u32; 2], is_maximized: bool) {
+        let Some(remembered) = &mut self.remembered else { return };
+        remembered.is_maximized = is_maximized;
+        if !is_maximized {
+            remembered.window = Some(size);
+        }
+    }
 }
 
 /// How a window is opened and painted.
@@ -76,6 +90,7 @@ impl WindowApp for App {
 struct WindowOptions {
     /// Points.
     size: [u32; 2],
+    is_maximized: bool,
     painter: Painter,
     /// Name of the device, and whether it has the validation layer; for [`Painter::Vulkan`].
     device: (Option<String>, bool),
@@ -153,10 +168,16 @@ pub fn run(options: &ViewOptions) -> Result<()> {
     };
     let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake), options.load())?;
     let device = (options.device_name.clone(), options.device.validation);
-    let window_options = WindowOptions { size: options.size, painter: options.painter, device };
     let mut app = App::new(options, mailbox, events);
+    let remembered = app.remembered.insert(Remembered::load());
+    let (size, is_maximized) = match options.size {
+        Some(size) => (size, false),
+        None => (remembered.window.unwrap_or(DEFAULT_SIZE), remembered.is_maximized),
+    };
+    let window_options = WindowOptions { size, is_maximized, painter: options.painter, device };
     let outcome = show(event_loop, &mut app, window_options);
     app.quit();
+    app.remembered.iter().for_each(Remembered::save);
     // a panic of it was an event, which the window has shown
     let _ = thread.join();
     outcome
@@ -167,7 +188,8 @@ pub fn run(options: &ViewOptions) -> Result<()> {
 /// # Errors
 /// [`Error::Device`] without a display.
 pub fn run_images(images: &mut impl WindowApp, size: [u32; 2]) -> Result<()> {
-    show(event_loop()?, images, WindowOptions { size, painter: Painter::Cpu, device: (None, false) })
+    let options = WindowOptions { size, is_maximized: false, painter: Painter::Cpu, device: (None, false) };
+    show(event_loop()?, images, options)
 }
 
 /// Opens a window and returns when it is closed.
@@ -213,6 +235,8 @@ impl<A: WindowApp> Viewer<'_, A> {
         let attributes = Window::default_attributes()
             .with_title("skylit")
             .with_inner_size(LogicalSize::new(self.options.size[0], self.options.size[1]))
+            .with_maximized(self.options.is_maximized)
+            .with_window_icon(icon::icon())
             .with_min_inner_size(LogicalSize::new(MIN_SIZE[0], MIN_SIZE[1]))
             // AccessKit wants to be there before it is seen
             .with_visible(false);
@@ -277,6 +301,8 @@ impl<A: WindowApp> Viewer<'_, A> {
         if size[0] == 0 || size[1] == 0 {
             return;
         }
+        let points = open.window.inner_size().to_logical::<u32>(open.window.scale_factor());
+        self.app.resized(points.into(), open.window.is_maximized());
 
         match open.presenter.present(size, self.app.layers(), &self.context, &mut open.painted) {
             Ok(()) => {

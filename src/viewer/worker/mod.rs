@@ -3,7 +3,9 @@
 mod black;
 mod compare;
 mod loader;
+mod outline;
 mod pane;
+mod summary;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,9 +14,10 @@ use std::time::{Duration, Instant};
 
 use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
+use summary::summary;
 
 use super::request::{
-    Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, TRUTH, Task,
+    Comparison, DeviceSummary, Event, EventSender, Mailbox, Outline, Progress, Request, SceneSummary, TRUTH, Task,
 };
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
@@ -41,6 +44,8 @@ const COMPARISON: Duration = Duration::from_millis(700);
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Samples per pixel from which an exposure is chosen: fewer leave many pixels black.
 const EXPOSURE_SAMPLES: u32 = 4;
+/// Panes that are kept when they are no longer shown.
+const PARKED: usize = 2;
 /// A comparison may take this share of the time.
 const COMPARISON_SHARE: u32 = 5;
 
@@ -292,8 +297,10 @@ impl Worker {
         let (mailbox, events) = (&self.mailbox, &self.events);
 
         // a variant that the scene before had may not exist in this one
-        if let Err(e) = open.renderer.apply_scene_settings(&first.meaning) {
-            let without = SceneSettings { variant: None, ..first.meaning.clone() };
+        let applied = open.renderer.apply_scene_settings(&first.meaning);
+        let is_edited = applied.is_ok();
+        if let Err(e) = applied {
+            let without = SceneSettings { mtl_dissolve: first.meaning.mtl_dissolve, ..SceneSettings::default() };
             open.renderer.apply_scene_settings(&without)?;
             events.send(Event::Warning(e.to_string()));
         }
@@ -322,6 +329,7 @@ impl Worker {
             tracer_reason,
             loader,
             panes: Vec::new(),
+            parked: Vec::new(),
             camera: None,
             time: 0.0,
             last_motion: Instant::now() - REST,
@@ -332,6 +340,8 @@ impl Worker {
             refused,
             black: [Blackness::Unknown; TRUTH + 1],
             knows_exposure: false,
+            outlined: None,
+            is_edited,
         };
         session.run()
     }
@@ -345,6 +355,8 @@ struct ViewerSession<'a> {
     tracer_reason: String,
     loader: Option<&'a Loader>,
     panes: Vec<Pane>,
+    /// Panes that were shown before in this view, the last one last.
+    parked: Vec<Pane>,
     camera: Option<Camera>,
     time: f64,
     last_motion: Instant,
@@ -360,6 +372,10 @@ struct ViewerSession<'a> {
     black: [Blackness; TRUTH + 1],
     /// The exposure of the scene's own light was sent.
     knows_exposure: bool,
+    /// Settings of materials and objects are in effect: the scene has all that they name.
+    is_edited: bool,
+    /// The instance whose outline was sent since the view has moved.
+    outlined: Option<usize>,
 }
 
 /// Whether an image at rest is black.
@@ -378,6 +394,9 @@ impl ViewerSession<'_> {
                 return Ok(());
             }
             self.move_to(&request)?;
+            if !self.edit_materials(&request)? {
+                return Ok(());
+            }
             self.match_panes(&request);
             let Some(camera) = self.camera.clone().filter(|_| request.size != [0; 2]) else {
                 self.choose_camera(&request)?;
@@ -392,6 +411,9 @@ impl ViewerSession<'_> {
                 outcome?;
             }
             let moves = self.last_motion.elapsed() < REST;
+            if !moves {
+                self.outline(&request, &camera)?;
+            }
             match self.next_pane(moves, &request) {
                 Some(k) => self.step(k, &request, number, changed, &camera, moves)?,
                 // what was moving comes to rest
@@ -408,7 +430,9 @@ impl ViewerSession<'_> {
 
     /// Returns true if this session can do what is requested.
     fn serves(&self, request: &Request) -> bool {
-        let source = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.animation);
+        // materials may be edited meanwhile
+        let meaning = |r: &Request| SceneSettings { material: Vec::new(), ..r.meaning.clone() };
+        let source = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), meaning(r), r.animation);
         let is_lit = request.lighting == self.first.lighting || Some(&request.lighting) == self.refused.as_ref();
         is_lit && source(request) == source(&self.first)
     }
@@ -423,11 +447,51 @@ impl ViewerSession<'_> {
             if self.camera.is_some() {
                 self.last_motion = Instant::now();
             }
-            self.panes.iter_mut().for_each(Pane::restart);
-            self.compared = None;
-            self.black = [Blackness::Unknown; TRUTH + 1];
+            self.restart();
         }
         self.camera = camera;
+        Ok(())
+    }
+
+    /// Begins anew: all that was rendered before is of another view.
+    fn restart(&mut self) {
+        self.panes.iter_mut().for_each(Pane::restart);
+        self.parked.clear();
+        (self.compared, self.outlined) = (None, None);
+        self.black = [Blackness::Unknown; TRUTH + 1];
+    }
+
+    /// Shows materials as they are requested. Returns false if the scene has to be prepared anew
+    /// for them.
+    fn edit_materials(&mut self, request: &Request) -> Result<bool> {
+        let edits = &request.meaning.material;
+        if self.interactive.edits() == edits || !self.is_edited {
+            return Ok(true);
+        }
+        if !self.interactive.edit_materials(edits)? {
+            return Ok(false);
+        }
+        self.last_motion = Instant::now();
+        self.restart();
+        Ok(true)
+    }
+
+    /// Sends the outline of what is selected, once for each view at rest.
+    fn outline(&mut self, request: &Request, camera: &Camera) -> Result<()> {
+        let Some(object) = request.selected.filter(|_| self.outlined != request.selected) else {
+            self.outlined = self.outlined.filter(|_| request.selected.is_some());
+            return Ok(());
+        };
+        // before the first image there is nothing to be hit
+        if self.interactive.build_stats().is_empty() {
+            return Ok(());
+        }
+        let scene = self.interactive.scene();
+        let bounds = request.animation.is_none().then(|| summary::bounds(scene, object)).flatten();
+        let (size, time) = (request.size, request.time);
+        let lines = outline::lines(&self.interactive, camera, object, bounds, size)?;
+        self.outlined = Some(object);
+        self.events.send(Event::Outline(Arc::new(Outline { object, camera: camera.clone(), time, size, lines })));
         Ok(())
     }
 
@@ -438,16 +502,26 @@ impl ViewerSession<'_> {
             match self.panes.get_mut(k) {
                 Some(pane) if pane.is_of(settings, size) => {}
                 Some(pane) => {
-                    let mut new = Pane::new(settings, size);
+                    let kept = self.parked.iter().position(|parked| parked.is_of(settings, size));
+                    let mut new = kept.map_or_else(|| Pane::new(settings, size), |at| self.parked.remove(at));
                     new.inherit_pace(pane);
-                    *pane = new;
+                    self.parked.push(std::mem::replace(pane, new));
                     self.compared = None;
                     self.black[request.pane(k)] = Blackness::Unknown;
                 }
-                None => self.panes.push(Pane::new(settings, size)),
+                None => {
+                    let kept = self.parked.iter().position(|parked| parked.is_of(settings, size));
+                    self.panes.push(kept.map_or_else(|| Pane::new(settings, size), |at| self.parked.remove(at)));
+                }
             }
         }
-        self.panes.truncate(request.panes.len());
+
+        // samples of what is not shown any more are kept, as long as the view does not change
+        let most = request.panes.len().min(self.panes.len());
+        self.parked.extend(self.panes.drain(most..));
+        self.parked.retain(|pane| pane.is_of_size(size) && !pane.has_failed());
+        let forgotten = self.parked.len().saturating_sub(PARKED);
+        self.parked.drain(..forgotten);
     }
 
     /// The pane to step next: while something moves those on the screen in turn, else the one that
@@ -691,25 +765,5 @@ impl Control for StopOnChange<'_> {
         };
         let is_useless = self.mailbox.is(|r| other(r) || !self.moves && moved(r));
         if is_useless { Err(Error::Interrupted) } else { Ok(false) }
-    }
-}
-
-fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
-    let animations = scene.rig.as_ref().map_or(&[][..], |rig| rig.animations());
-    let name = |k: usize, name: &str| if name.is_empty() { format!("{k}") } else { name.to_owned() };
-    SceneSummary {
-        load: 0,
-        is_complete: scene.report.skipped_images == 0,
-        source: source.to_owned(),
-        files: scene.report.files.clone(),
-        bounds: scene.bounds().unwrap_or_default(),
-        cameras: scene.cameras.clone(),
-        animations: animations.iter().enumerate().map(|(k, a)| (name(k, &a.name), a.duration)).collect(),
-        scenes: scene.report.scenes.clone(),
-        variants: scene.variants.clone(),
-        textures: scene.textures.iter().enumerate().map(|(k, t)| name(k, &t.name)).collect(),
-        primitives: scene.triangle_count() + scene.sphere_count(),
-        counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],
-        seconds: time.as_secs_f64(),
     }
 }

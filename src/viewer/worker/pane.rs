@@ -85,6 +85,11 @@ impl Pane {
         self.settings == *settings && self.size == size
     }
 
+    /// Returns true if it is of this size.
+    pub fn is_of_size(&self, size: [u32; 2]) -> bool {
+        self.size == size
+    }
+
     /// Keeps what was measured for a pane of other settings or another size.
     pub fn inherit_pace(&mut self, before: &Self) {
         if self.settings.integrator == before.settings.integrator {

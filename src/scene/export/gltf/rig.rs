@@ -29,7 +29,7 @@ pub(super) struct Tree {
 pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
     let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new(), lights: BTreeMap::new() };
     let Some(rig) = rig else {
-        tree.nodes = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
+        tree.nodes = scene.shown_instances().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
         tree.roots = (0..tree.nodes.len()).collect();
         return tree;
     };
@@ -50,7 +50,8 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
 
     // meshes go to the nodes that carry them, or to nodes of their own
     let deforming: BTreeMap<usize, &Deformation> = parts.deformations.iter().map(|d| (d.mesh, d)).collect();
-    for (i, instance) in scene.instances.iter().enumerate() {
+    let left_out = scene.left_out();
+    for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| !left_out.contains(i)) {
         let deformation = deforming.get(&instance.mesh);
         let skinned = deformation.filter(|d| d.skin.is_some());
         let Some(on) = skinned.map(|d| d.node).or_else(|| parts.instances.get(i).copied().flatten()) else {
