@@ -1,33 +1,7 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
-#include "common/pixel_filter.glsl"
 #include "path/known_hit.glsl"
-#include "path/path.glsl"
+#include "path/camera.glsl"
 #include "common/frame.glsl"
-
-// Where a ray through a lens starts, and where it goes: to the point that the ray through the lens' middle meets in the plane of focus.
-Ray lens_ray(BlockParams p, Ray r, vec2 u) {
-    PathParams path = path_params();
-    vec4 rows[3] = p.camera_to_world;
-    vec3 right = vec3(rows[0].x, rows[1].x, rows[2].x), up = vec3(rows[0].y, rows[1].y, rows[2].y), back = vec3(rows[0].z, rows[1].z, rows[2].z);
-    vec2 lens = path.lens_radius * concentric_disk(u).xy;
-    vec3 sharp = r.origin + r.direction * (path.focus / -dot(r.direction, back));
-    r.origin += right * lens.x + up * lens.y;
-    r.direction = normalize(sharp - r.origin);
-    return r;
-}
-
-Ray camera_sample(BlockParams p, uint index) {
-    if (!in_block(p, block_pixel(p, path_cell(index)))) return no_ray();
-    uvec2 pixel = path_pixel(p, index);
-    if (WITH_SIGNAL && any(greaterThanEqual(pixel, p.image_size))) return no_ray();
-    vec2 u = sample_2d(p.seed, pixel, path_sample(index), CAMERA_FILM);
-    // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest, where a frame has several, each has a place of its own, as in a still.
-    vec2 offset = WITH_SIGNAL && p.pixel_filter == FILTER_CENTRE ? p.centre_offset : !WITH_SIGNAL && WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
-    Ray r = unclipped_camera_ray(p, vec2(pixel) + 0.5 + offset);
-    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(index), 0u));
-    if (WITH_LENS) r = lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(index), CAMERA_LENS));
-    return clip_ray(p, r);
-}
 
 // Where it has been traced for the G-buffer.
 Hit known_hit(uint index) {
@@ -53,14 +27,7 @@ void closest(uint index, Hit hit) {
     }
     PathParams path = path_params();
     if (WITH_SIGNAL) clear_signal(path, k);
-    // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
-    float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
-    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, false, scale, NO_MEDIUM);
-    if (WITH_MEDIA) {
-        state.medium = current_medium(path.camera_media);
-        // clipping planes hide surfaces, not what the camera is in
-        state.throughput *= transmittance(state.medium, clipped_length(p, r.direction));
-    }
+    PathState state = camera_state(p, path, index, r.direction);
     if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), path_sample(index), 1u);
     vec3 seen = path_vertex(p, k, state, r, hit);
     float covered = is_hit(hit) ? 1.0 : 0.0;

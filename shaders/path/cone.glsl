@@ -112,13 +112,4 @@ Cone scattered_cone(Cone c, Surface s, bool front, BsdfSample b, bool passes) {
     return c;
 }
 
-Cone load_cone(PathParams p, uint k) {
-    vec2 c = load_vec2(p.cones, k);
-    return Cone(c.x, c.y);
-}
-
-void store_cone(PathParams p, uint k, Cone c) {
-    STORE_PAIR(p.cones, k, floatBitsToUint(vec2(c.width, c.spread)));
-}
-
 #endif

@@ -80,8 +80,4 @@ Dispersion dispersion_at(Boundary b, float place, bool is_single) {
     return Dispersion(true, is_single ? vec3(1.0) : color_of_wavelength(place), etas);
 }
 
-MediaStack load_media(PathParams p, uint k) { return LOAD_QUAD(p.media, k); }
-
-void store_media(PathParams p, uint k, MediaStack stack) { store_quad(p.media, k, uintBitsToFloat(stack)); }
-
 #endif

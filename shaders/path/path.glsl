@@ -9,6 +9,7 @@
 #include "path/scattering.glsl"
 #include "path/view.glsl"
 #include "path/ambient.glsl"
+#include "path/leave.glsl"
 #include "path/signal.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
@@ -127,7 +128,7 @@ bool splits_lights(PathState state) { return WITH_LIGHT_SPLIT && state.depth == 
 // Shares of the light samples at the path's last bounce.
 LightShares last_shares(PathParams p, uint k, PathState state) {
     if (!WITH_LIGHT_GROUPS || state.depth == 0u || WITH_LIGHT_SPLIT && state.depth == 1u) return ONE_OF_EACH;
-    float placed = Floats(p.placed_shares).v[k];
+    float placed = load_placed_share(p, k);
     return LightShares(placed, 1.0 - placed);
 }
 
@@ -158,23 +159,16 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
     c = counted_radiance(p, c, state.depth + 1u);
-    // two rays that add to a path at the same time would depend on their order: each has its own queue
-    uint slot;
-    if (is_second) slot = append_ray(p.distant_shadow, shadow, k);
-    else slot = append_ray(p.shadow, shadow, k);
-    store_quad(is_second ? p.distant_contributions : p.contributions, slot, vec4(c, 0.0));
-    if (WITH_SIGNAL) {
-        vec3 share = v.is_apart ? diffuse_share(m, wo, l.wi, value.f) : v.share;
-        store_quad(is_second ? p.distant_diffuse_contributions : p.diffuse_contributions, slot, vec4(c * share, 0.0));
-    }
+    vec3 diffuse = vec3(0.0);
+    if (WITH_SIGNAL) diffuse = c * (v.is_apart ? diffuse_share(m, wo, l.wi, value.f) : v.share);
+    leave_light_ray(p, k, is_second, shadow, c, diffuse);
 }
 
 // Continues the path behind a surface, unchanged.
 void pass_straight(PathParams p, uint k, PathState state, Surface s, vec3 ng, Ray ray, Cone cone) {
     state.passes++;
     if (WITH_RAY_CONES) store_cone(p, k, cone);
-    uint slot = append_ray(p.next, Ray(s.position - ng * s.offset, 0.0, ray.direction, INFINITY), k);
-    store_state(p.next_states, slot, state);
+    leave_next_ray(p, k, Ray(s.position - ng * s.offset, 0.0, ray.direction, INFINITY), state);
 }
 
 // Distance since the last bounce, straight through surfaces.
@@ -215,8 +209,7 @@ void scatter_path(BlockParams block, PathParams p, uint k, PathState state, Ray 
     vec3 w = scattered_direction(ray.direction, SHADING_OF(state.medium).scatter_anisotropy, sample_2d(block.seed, pixel, n, dimension + SCATTERED));
     state.pdf = -1.0;
     state.passes++;
-    uint slot = append_ray(p.next, Ray(ray.origin + length_ * ray.direction, 0.0, w, INFINITY), k);
-    store_state(p.next_states, slot, state);
+    leave_next_ray(p, k, Ray(ray.origin + length_ * ray.direction, 0.0, w, INFINITY), state);
 }
 
 // k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
@@ -245,7 +238,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             if (state.depth > 0u) light = met.a;
         } else {
             c = environment_radiance(p, ray.direction);
-            if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) light = Floats(p.sky_pdfs).v[k];
+            if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) light = load_sky_pdf(p, k);
         }
         c *= emission_weight(p, state, share * light);
         if (WITH_BACKGROUND_ONLY && state.depth > 0u) c = vec3(0.0);
@@ -358,8 +351,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_LIGHT_GROUPS && !splits) StoredFloats(p.placed_shares).v[k] = shares.placed;
-        if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
+        if (WITH_LIGHT_SAMPLES && WITH_LIGHT_GROUPS && !splits) store_placed_share(p, k, shares.placed);
+        if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) store_sky_pdf(p, k, sky_pdf(p, m, s.position, b.wi));
         if (state.depth >= p.options.rr_depth) {
             float survival = min(brightest * state.eta_scale, b.delta ? MAX_SPECULAR_SURVIVAL : MAX_SURVIVAL);
             if (lobe.y >= survival) return added;
@@ -371,8 +364,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         }
     }
     if (WITH_RAY_CONES) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
-    uint slot = append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
-    store_state(p.next_states, slot, state);
+    leave_next_ray(p, k, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), state);
     return added;
 }
 

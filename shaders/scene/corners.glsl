@@ -10,6 +10,11 @@ struct Corners {
 
 #ifdef KEEPS_CORNERS
 Corners hit_corners;
+
+vec3 pick_corner(vec3 p0, vec3 p1, vec3 p2, uint k) {
+    return k == 0u ? p0 : k == 1u ? p1 : p2;
+}
+
 Corners corners_of_hit(SubmeshRecord submesh, uint primitive) { return hit_corners; }
 #else
 Corners corners_of_hit(SubmeshRecord submesh, uint primitive) {

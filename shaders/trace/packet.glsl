@@ -104,10 +104,6 @@ uint all_min(uint x) { return SUBGROUP_SIZE > 16u ? subgroupMin(x) : min_over_la
         } \
     }
 
-vec3 pick_corner(vec3 p0, vec3 p1, vec3 p2, uint k) {
-    return k == 0u ? p0 : k == 1u ? p1 : p2;
-}
-
 void main() {
     SceneRoot root = SceneRoot(push.scene);
     uvec2 blocks = root.nodes;

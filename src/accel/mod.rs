@@ -5,6 +5,7 @@ pub mod bvh2;
 pub mod cache;
 pub mod clip;
 pub mod features;
+pub mod few;
 pub mod flatten;
 pub mod lab;
 pub mod pairs;

@@ -423,7 +423,7 @@ pub(super) mod tests {
     use super::*;
     use crate::accel::{BuildPreset, build};
 
-    fn boxes(n: usize, scale: f32, offset: f32) -> Vec<Aabb> {
+    pub fn boxes(n: usize, scale: f32, offset: f32) -> Vec<Aabb> {
         (0..n)
             .map(|i| {
                 let c = Vec3::new((i * 37 % 101) as f32, (i * 61 % 89) as f32, (i * 17 % 97) as f32) * scale + offset;

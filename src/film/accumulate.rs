@@ -35,6 +35,11 @@ pub(crate) trait Estimator {
         false
     }
 
+    /// Number of regions whose work the longest region of a launch does ([`Pace::with_steps`]).
+    fn steps(&self) -> u32 {
+        1
+    }
+
     /// Prepares the launches of a batch of a block, which add to the pixels at the device address
     /// `film`, and returns the address of the pass's parameters. `keep`: the batch is the first
     /// sample and [`Estimator::keeps_first`] is true.
@@ -175,11 +180,12 @@ pub(crate) fn accumulate<E: Estimator>(
 
     // Take step after step, until the film is finished or a stop is requested.
     let blocks = Block::cut(samples.size);
+    let steps = estimator.steps();
     let launcher = Launcher {
         tracer,
         estimator,
         commands: Commands::new(tracer.device())?,
-        pace: Pace::up_to(launch_rays(&tracer.device().info)),
+        pace: Pace::up_to(launch_rays(&tracer.device().info)).with_steps(steps),
     };
     let rates = vec![Rate::default(); blocks.len()];
     let displayed = options.display_target.map(|target| DisplayErrors::new(target, &out.film));

@@ -21,6 +21,8 @@ pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 pub struct Pace {
     rays: u32,
     most: u32,
+    /// Duration of a launch that is aimed for, seconds.
+    target: f64,
     seen: bool,
 }
 
@@ -33,7 +35,13 @@ impl Default for Pace {
 impl Pace {
     /// For launches of at most `most` rays.
     pub fn up_to(most: u32) -> Self {
-        Self { rays: FIRST.min(most), most, seen: false }
+        Self { rays: FIRST.min(most), most, target: TARGET, seen: false }
+    }
+
+    /// For launches of which one region does the work of `steps` regions of others: it may take as
+    /// long as they take together.
+    pub fn with_steps(self, steps: u32) -> Self {
+        Self { target: TARGET * f64::from(steps), ..self }
     }
 
     /// Rays of the next launch; a multiple of [`GRAIN`].
@@ -77,7 +85,7 @@ impl Pace {
         let longest = timings.iter().map(|t| t.seconds).fold(0.0, f64::max);
         // without timestamps, the wall time is divided evenly among the launches
         let seconds = if longest > 0.0 { longest } else { wall / launches.max(1) as f64 };
-        let fit = rays as f64 * TARGET / seconds.max(1e-6);
+        let fit = rays as f64 * self.target / seconds.max(1e-6);
         // the first launch may have compiled the shader: its time says little
         let growth = if self.seen { 2.0 } else { 4.0 };
         let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(GRAIN.into(), self.most as f64);

@@ -185,10 +185,14 @@ pub const fn wide_kernel(mode: Mode, ballot: bool) -> Shader {
     Shader::new(Source::Kernel { mode, ballot })
 }
 
+/// Whole paths in one kernel, which traces their rays itself.
+pub const PATH_MEGAKERNEL: Shader = Shader::new(Source::Tracing { pass: "path_megakernel" });
+
 /// Lists all shaders of the program.
 pub fn list_shaders() -> Vec<Shader> {
     let streams = STREAMS.iter().flat_map(|s| s.variants());
     let compute = COMPUTE.iter().flat_map(|c| c.variants());
     let kernels = [Any, Closest].into_iter().flat_map(|mode| [false, true].map(|ballot| wide_kernel(mode, ballot)));
-    streams.chain(compute).chain(STAGES.iter().map(|s| **s)).chain(kernels).collect()
+    let stages = STAGES.iter().map(|s| **s);
+    streams.chain(compute).chain(stages).chain(kernels).chain([PATH_MEGAKERNEL]).collect()
 }

@@ -216,6 +216,12 @@ pub enum Source {
         /// For devices with 64-bit integers and subgroup ballots.
         ballot: bool,
     },
+    /// A pass that traces its rays itself, by the compute tracer's functions, on devices with 64-bit
+    /// integers and subgroups of a known size.
+    Tracing {
+        /// File in shaders/, without its ending.
+        pass: &'static str,
+    },
     /// A whole file.
     File {
         /// In shaders/.
@@ -233,6 +239,7 @@ impl Source {
             Self::Stream { pass, mode, variant } => format!("{pass}_{}_{variant:?}", mode.name()),
             Self::Compute { pass, int64 } => format!("{pass}_{}", bits(int64)),
             Self::Kernel { mode, ballot } => format!("wide_{}_{}", mode.name(), bits(ballot)),
+            Self::Tracing { pass } => format!("{pass}_tracing"),
             Self::File { path, .. } => path.replace(['/', '.'], "_"),
         }
     }
@@ -290,6 +297,9 @@ impl Source {
                 if *ballot { format!("{HEAD_64}{HEAD_BALLOT}") } else { String::new() },
                 mode.define()
             ),
+            Self::Tracing { pass } => {
+                format!("#version 460\n{EXTENSIONS}{HEAD_64}{HEAD_BALLOT}{lanes}{spread}#include \"{pass}.glsl\"\n")
+            }
             Self::File { path, .. } => {
                 let path = shaders.join(path);
                 std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?
@@ -307,6 +317,7 @@ impl fmt::Display for Source {
             }
             Self::Compute { pass, int64 } => write!(f, "{pass}.glsl ({}-bit loads)", bits(int64)),
             Self::Kernel { mode, ballot } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(ballot)),
+            Self::Tracing { pass } => write!(f, "{pass}.glsl (traces its rays)"),
             Self::File { path, .. } => f.write_str(path),
         }
     }

@@ -46,6 +46,7 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         stack_entries: 0,
         bounds: flat.bounds(),
         unfinished: unfinished_counter(device)?,
+        few: None,
         launch: None,
         dynamic: None,
     })

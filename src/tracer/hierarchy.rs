@@ -30,6 +30,9 @@ pub(super) struct Hierarchy {
     pub bounds: Aabb,
     /// A u32: number of rays whose traversal the driver ended early.
     pub unfinished: Buffer,
+    /// The leaves of a static scene without instances that has few, and their number, for passes
+    /// that trace rays among other work.
+    pub few: Option<(Buffer, u32)>,
     /// Buffers between the steps of a launch (fast kernel only).
     pub launch: Option<LaunchMemory>,
     /// State to update it in a dynamic scene (fast kernel only).

@@ -32,6 +32,7 @@ pub mod settings;
 pub(crate) mod shading;
 pub mod stream;
 mod textures;
+mod tracing_pass;
 pub mod transform;
 mod upload;
 pub mod visits;
@@ -48,6 +49,7 @@ pub use needs::Needs;
 pub use raster_instance::RasterInstance;
 pub use settings::{BuildChoice, BuildMethod, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
+pub use tracing_pass::TracingPass;
 #[cfg(feature = "probes")]
 pub use wide::probes as hierarchy_probes;
 

@@ -81,6 +81,7 @@ impl Trees {
             stack_entries,
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,
+            few: None,
             launch: None,
             dynamic: None,
         })

@@ -112,7 +112,7 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
 
 /// Numbers of work-groups along x, y and z for at least `parts` parts, in runs of `run`
 /// (shaders/trace/spread.glsl).
-fn spread(parts: u32, run: u32) -> [u32; 3] {
+pub(super) fn spread(parts: u32, run: u32) -> [u32; 3] {
     [run, parts.div_ceil(run * SPREAD), SPREAD]
 }
 

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Vec3;
+use glam::{DAffine3, Vec3};
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
@@ -18,6 +18,7 @@ use super::stream::{LaunchMemory, SuspendedRays, launch_rays, with_uncovered};
 use super::upload::write_records;
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::{Entries, KeyBuilder};
+use crate::accel::few::FewLeaves;
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::pairs::{self, Fan, Pair};
 use crate::accel::wide::{self, Block, WideBvh};
@@ -132,6 +133,16 @@ impl Trees {
             None => count as u64,
         };
 
+        // the leaves, where there are few, nothing moves, and all are in the world's space
+        let is_baked = |i: &TlasInstance| i.scene_instance.is_none() && i.to_world == DAffine3::IDENTITY && !i.hidden;
+        let few = (dynamic.is_none() && flat.instances.iter().all(is_baked))
+            .then(|| FewLeaves::collect(flat.instances.iter().map(|i| &self.groups[i.group])))
+            .flatten();
+        let few = few.map(|few| {
+            let buffer = Buffer::from_slice(device, "few leaves", &few.bytes())?;
+            Ok::<_, Error>((buffer, few.leaves.len() as u32))
+        });
+
         // memory of a launch
         let capacity = with_uncovered(launch_rays(&device.info));
         let launch = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
@@ -145,6 +156,7 @@ impl Trees {
             unfinished: unfinished_counter(device)?,
             dynamic: dynamic.map(|mut d| d.keep_copy(device, &nodes).map(|()| d)).transpose()?,
             nodes,
+            few: few.transpose()?,
             launch: Some(LaunchMemory {
                 capacity,
                 rays: launch("launch rays", size_of::<Ray>() as u64)?,

@@ -24,6 +24,7 @@ mod light_groups;
 mod lit;
 mod materials;
 mod media;
+mod megakernel;
 mod oren_nayar;
 mod portals;
 mod scattering;

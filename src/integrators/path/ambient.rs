@@ -118,12 +118,13 @@ impl PathEstimator {
     fn launch_distances(&self, commands: &mut Commands, push: Push, distance: &Stream) -> Result<Vec<Timing>> {
         let of_ambient = |rays: &&FirstSurfaceRays| rays.count == AMBIENT_COUNT;
         let Some(ambient) = self.of_first_surface.iter().find(of_ambient) else { return Ok(Vec::new()) };
+        let wavefront = self.traced_by.wavefront()?;
         let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.params[k].address(), ..push });
         commands.run(|r| {
             self.buffers.queues[0].clear(r);
             self.clear_light_queues(r);
             r.barrier();
-            self.pipelines.camera.record(r, &camera);
+            wavefront.camera.record(r, &camera);
             r.barrier();
             distance.record(r, &ambient.queue.push(occlusion, push.count));
             r.barrier();

@@ -17,6 +17,7 @@ mod light_sources;
 mod light_tree;
 mod lights;
 mod media;
+mod megakernel;
 mod params;
 mod report;
 pub mod settings;
@@ -40,13 +41,14 @@ use crate::scene::Scene;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::queue::RayQueue;
 use crate::tracer::stream::launch_rays;
-use crate::tracer::{Push, Stream, Tracer};
+use crate::tracer::{Push, Stream, Tracer, TracingPass};
 use buffers::{AMBIENT_COUNT, COUNTS, DISTANT_COUNT, FirstSurfaceRays, PathBuffers};
 use environment::DeviceEnvironment;
 use light_sources::LightSources;
 use lights::LightBuilder;
 use lights::device::DeviceLights;
 use media::ClosedVolumes;
+pub use megakernel::{PathKernel, Schedule};
 use params::{LaunchParams, PathFrameParams, PathParams, QUAD_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
@@ -79,6 +81,8 @@ pub struct PathResult {
     pub features: PathFeatures,
     /// Kinds of lights that light sampling was compiled for.
     pub light_kinds: LightKinds,
+    /// How paths were traced, and why.
+    pub schedule: Schedule,
 }
 
 /// The streams that [`render`] traces and that depend on nothing but the scene's geometry.
@@ -181,6 +185,7 @@ impl PathIntegrator {
             light_tree: paths.features.contains(PathFeature::LightTree),
             features: paths.features,
             light_kinds: paths.light_kinds,
+            schedule: paths.schedule,
         })
     }
 }
@@ -203,18 +208,25 @@ struct TransmittedShadowRays {
     count: Buffer,
 }
 
-/// Streams and pipelines of all launches.
-struct PathPipelines {
+/// What traces the paths of all launches.
+enum TracedBy {
+    Wavefront(Arc<Wavefront>),
+    Megakernel(TracingPass),
+}
+
+/// Streams of the steps of paths.
+struct Wavefront {
     camera: Stream,
     /// As `camera`, for hits of another pass; `None` where each path has a camera ray of its own.
     known: Option<Stream>,
     bounce: Stream,
     shadow: Stream,
-    resolve: ComputePipeline,
 }
 
 struct PathEstimator {
-    pipelines: PathPipelines,
+    traced_by: TracedBy,
+    resolve: ComputePipeline,
+    schedule: Schedule,
     /// The launches that follow begin at known hits ([`PathFrameParams::known_hits`]).
     begins_at_known: bool,
     buffers: PathBuffers,
@@ -258,17 +270,27 @@ impl TransmittedShadowRays {
     }
 }
 
-impl PathPipelines {
-    /// Compiles them. `has_known_hits`: paths may begin at camera rays that another pass traced.
-    fn new(tracer: &Tracer, constants: &Specialization, has_known_hits: bool) -> Result<Self> {
+impl TracedBy {
+    /// Compiles it. `has_known_hits`: paths may begin at camera rays that another pass traced.
+    fn new(tracer: &Tracer, constants: &Specialization, has_known_hits: bool, schedule: Schedule) -> Result<Self> {
+        if let Schedule::Megakernel(_) = schedule {
+            return tracer.tracing_pass("path_megakernel", &shaders::PATH_MEGAKERNEL, constants).map(Self::Megakernel);
+        }
         let known = || tracer.with_known_hits(&shaders::PATH_CAMERA_CLOSEST, constants);
-        Ok(Self {
+        Ok(Self::Wavefront(Arc::new(Wavefront {
             camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, constants)?,
             known: has_known_hits.then(known).transpose()?,
             bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, constants)?,
             shadow: tracer.stream(&shaders::PATH_SHADOW_ANY)?,
-            resolve: shaders::PATH_RESOLVE.pipeline(tracer.device())?,
-        })
+        })))
+    }
+
+    /// The streams of the wavefront.
+    fn wavefront(&self) -> Result<&Arc<Wavefront>> {
+        match self {
+            Self::Wavefront(wavefront) => Ok(wavefront),
+            Self::Megakernel(_) => Err(Error::Usage("paths of the megakernel have no steps".into())),
+        }
     }
 }
 
@@ -310,13 +332,20 @@ impl PathEstimator {
         let sources = LightSources::new(device, flat, options)?;
         let (mut features, light_kinds) = sources.features(flat, options, cones);
         features.insert_if(has_signal, PathFeature::Signal);
+        let schedule = Schedule::choose(options.kernel, tracer, features)?;
+        let (few, few_count) = tracer.few_leaves().unwrap_or_default();
         let stores_sky_pdfs = sources.needs_sky_pdfs(features, light_kinds);
         let LightSources { environment, lights, builder } = sources;
         let lights = DeviceLights::new(device, lights)?;
         let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
 
         // Buffers.
+        let counts = Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?;
         let base = PathParams {
+            counts: counts.address(),
+            few,
+            few_count,
+            max_rays: max_rays_of_path(features, options.bounces()),
             map: environment.map,
             environment: environment.factor.to_array(),
             ..lights.params(options.params())
@@ -332,10 +361,12 @@ impl PathEstimator {
 
         // Pipelines.
         let shares_camera_rays = !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens);
-        let pipelines = PathPipelines::new(tracer, &constants, has_signal && shares_camera_rays)?;
+        let traced_by = TracedBy::new(tracer, &constants, has_signal && shares_camera_rays, schedule)?;
 
         Ok(Self {
-            pipelines,
+            traced_by,
+            resolve: shaders::PATH_RESOLVE.pipeline(device)?,
+            schedule,
             begins_at_known: false,
             buffers,
             params: upload_params(device, &records)?,
@@ -344,7 +375,7 @@ impl PathEstimator {
             walls,
             of_first_surface,
             volumes: features.contains(PathFeature::Media).then(|| ClosedVolumes::new(flat)),
-            counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?,
+            counts,
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
@@ -416,13 +447,13 @@ impl PathEstimator {
     }
 
     /// Records the shadow rays that a vertex generated; their number is read back from `slot`.
-    fn record_shadow(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
+    fn record_shadow(&self, wavefront: &Wavefront, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         if !self.samples_lights {
             return;
         }
         r.barrier();
         match &self.walls {
-            None => self.pipelines.shadow.record(r, &self.buffers.shadow_queue.push(push, most)),
+            None => wavefront.shadow.record(r, &self.buffers.shadow_queue.push(push, most)),
             Some(walls) => {
                 walls.later.clear(r);
                 r.barrier();
@@ -437,11 +468,11 @@ impl PathEstimator {
     }
 
     /// Records the rays of first surfaces of a vertex; their number is read back from `slot`.
-    fn record_first_surface(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
+    fn record_first_surface(&self, wavefront: &Wavefront, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         for FirstSurfaceRays { queue, params, count } in &self.of_first_surface {
             r.barrier();
             let push = Push { pass: self.params[*params].address(), ..push };
-            self.pipelines.shadow.record(r, &queue.push(push, most));
+            wavefront.shadow.record(r, &queue.push(push, most));
             r.barrier();
             r.copy(queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + count), 4);
         }
@@ -478,13 +509,19 @@ impl PathEstimator {
         }
     }
 
-    /// Traces all bounces of a launch, and adds the paths to the film.
+    /// Traces the paths of a launch, and adds them to the film.
     fn trace_to_film(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
-        let resolved = Push { pass: self.film.address(), ..push };
+        match &self.traced_by {
+            TracedBy::Megakernel(_) => self.trace_at_once(commands, push),
+            TracedBy::Wavefront(_) => self.trace(commands, push, |paths, r| paths.record_resolve(r, push)),
+        }
+    }
+
+    /// Records how the paths of a launch are added to the film.
+    fn record_resolve(&self, r: &mut Recorder, push: Push) {
+        let push = Push { pass: self.film.address(), ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
-        self.trace(commands, push, |paths, r| {
-            r.timed("path_resolve", |r| r.dispatch(&paths.pipelines.resolve, &resolved, groups))
-        })
+        r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push, groups));
     }
 
     /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with
@@ -495,11 +532,11 @@ impl PathEstimator {
         push: Push,
         finish: impl Fn(&Self, &mut Recorder),
     ) -> Result<Vec<Timing>> {
+        let wavefront = self.traced_by.wavefront()?.clone();
         let passes = [0, 1].map(|k| self.params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
-        // a surface that a path passes straight through is no bounce, but needs a launch
-        let straight = self.volumes.is_some() || self.features.contains(PathFeature::ClearWalls);
-        let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
+        let (straight, max_launches) =
+            (passes_straight(self.features), max_rays_of_path(self.features, self.max_depth));
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         let mut longest = 0;
 
@@ -520,10 +557,10 @@ impl PathEstimator {
                     self.buffers.queues[0].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    let known = self.pipelines.known.as_ref().filter(|_| self.begins_at_known);
-                    known.unwrap_or(&self.pipelines.camera).record(r, &push(0));
-                    self.record_shadow(r, push(0), left, MAX_BOUNCES);
-                    self.record_first_surface(r, push(0), left, MAX_BOUNCES);
+                    let known = wavefront.known.as_ref().filter(|_| self.begins_at_known);
+                    known.unwrap_or(&wavefront.camera).record(r, &push(0));
+                    self.record_shadow(&wavefront, r, push(0), left, MAX_BOUNCES);
+                    self.record_first_surface(&wavefront, r, push(0), left, MAX_BOUNCES);
                 }
                 while depth < last {
                     let slot = depth - begin;
@@ -533,12 +570,12 @@ impl PathEstimator {
                     self.buffers.queues[fills].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    self.pipelines.bounce.record(r, &self.buffers.queues[traced].push(push(fills), left));
+                    wavefront.bounce.record(r, &self.buffers.queues[traced].push(push(fills), left));
                     r.copy(self.buffers.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * slot), 4);
-                    self.record_shadow(r, push(fills), left, slot);
+                    self.record_shadow(&wavefront, r, push(fills), left, slot);
                     // surfaces behind those that paths pass straight through are first ones, too
                     if straight {
-                        self.record_first_surface(r, push(fills), left, slot);
+                        self.record_first_surface(&wavefront, r, push(fills), left, slot);
                     }
                 }
 
@@ -579,6 +616,16 @@ impl PathEstimator {
     }
 }
 
+/// Whether paths pass straight through surfaces: such a passage is no bounce, but needs a ray.
+fn passes_straight(features: PathFeatures) -> bool {
+    features.contains(PathFeature::Media) || features.contains(PathFeature::ClearWalls)
+}
+
+/// Maximum number of rays of a path, without the camera ray.
+fn max_rays_of_path(features: PathFeatures, max_depth: u32) -> u32 {
+    if passes_straight(features) { max_depth.saturating_add(MAX_STRAIGHT) } else { max_depth }
+}
+
 /// Number of bounces in the next submission of a launch of `all` paths of which `left` are left,
 /// where the launch before took `before` more bounces. A launch is as large as the paths left at
 /// its recording, and a submission costs some tenths of a millisecond on a GPU: the fewer are left,
@@ -590,6 +637,10 @@ fn bounces_of_submission(all: u32, left: u32, before: u32) -> u32 {
 
 impl Estimator for PathEstimator {
     const CHANNELS: usize = 3;
+
+    fn steps(&self) -> u32 {
+        if let TracedBy::Megakernel(_) = self.traced_by { megakernel::STEPS } else { 1 }
+    }
 
     fn begin(&mut self, block: &BlockParams, film: u64, _: bool) -> Result<u64> {
         self.write_block(block)?;

@@ -65,6 +65,7 @@ pub(super) fn report(
         compiled("textures beside base colours:", shading.textures.labels()),
         compiled("lights and options require", joined(result.light_kinds.labels(), result.features.labels())),
         mip_levels(o, &stats),
+        format!("paths by {}", result.schedule),
     ];
     explanations.push(match result.lights {
         0 => "no light sampling: there are no lights, or --sampling does not use it".into(),

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::ambient::{Ambient, EnvironmentLight, OccludedLight};
 use super::params::PathParams;
-use super::{PixelFilter, View};
+use super::{PathKernel, PixelFilter, View};
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
 use crate::integrators::RenderJob;
@@ -20,6 +20,8 @@ use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
 const LIGHT: AppliesTo = AppliesTo::all_of(Capability::LightTransport);
+/// Stills of integrators that trace light paths.
+const PATHS: AppliesTo = AppliesTo::stills_of(Capability::LightTransport);
 /// Integrators whose path length is configurable.
 const LONG: AppliesTo = AppliesTo::all_of(Capability::PathLength);
 /// Integrators that use a pixel filter and a lens.
@@ -113,6 +115,8 @@ settings! {
         environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
         /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
         occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
+        /// How paths are traced, for comparison: images are the same [default: auto]
+        path_kernel: Option<PathKernel>, option(value_enum), applies(PATHS), research;
         /// Texture filter of paths [default: bilinear]
         texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
         /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres
@@ -158,6 +162,8 @@ pub struct PathOptions {
     pub firefly_clamp: f32,
     /// Scale factor of indirect light, of two bounces or more.
     pub indirect_scale: f32,
+    /// How paths are traced, which no image depends on.
+    pub kernel: PathKernel,
 }
 
 impl Default for PathOptions {
@@ -177,6 +183,7 @@ impl Default for PathOptions {
             rr_depth: 5,
             firefly_clamp: f32::INFINITY,
             indirect_scale: 1.0,
+            kernel: PathKernel::Auto,
         }
     }
 }
@@ -193,6 +200,7 @@ impl PathSettings {
             ("sampling", json!(Strategy::default())),
             ("texture_filter", json!(TextureFilter::default())),
             ("sky_albedo", json!(SKY_ALBEDO)),
+            ("path_kernel", json!(PathKernel::default())),
         ];
         defaults.into_iter().filter(|(_, v)| !v.is_null()).map(|(k, v)| (k.to_owned(), v)).collect()
     }
@@ -228,6 +236,7 @@ impl PathOptions {
             specular_only: _,
             texture_filter,
             lens,
+            kernel: _,
         } = self;
 
         // Texts of metadata are short, and absent where the default holds.
@@ -332,6 +341,7 @@ impl PathOptions {
             strategy: settings.sampling.unwrap_or_default(),
             texture_filter: settings.texture_filter.unwrap_or_default(),
             lens: settings.lens(job.camera.projection)?,
+            kernel: settings.path_kernel.unwrap_or_default(),
             ..Self::default()
         };
         options.set_numbers(settings);

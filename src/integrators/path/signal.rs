@@ -111,7 +111,7 @@ impl SignalPaths {
     /// Returns true if paths can begin at [`PathFrameParams::known_hits`], as they share camera
     /// rays.
     pub fn can_begin_at_known(&self) -> bool {
-        self.paths.pipelines.known.is_some()
+        self.paths.traced_by.wavefront().is_ok_and(|wavefront| wavefront.known.is_some())
     }
 
     /// Begins a frame: the camera and its block, with [`BlockParams::centre_offset`] and

@@ -126,6 +126,11 @@ records! {
         placed_shares: address,
         /// The options that are numbers.
         options: PathOptionsRecord,
+        /// Three uints that `path_megakernel` adds to: numbers of bounce rays and of shadow rays, and
+        /// bounces of the longest path.
+        counts: address,
+        /// Maximum number of rays of a path in `path_megakernel`, without the camera ray.
+        max_rays: uint,
         /// Number of placed lights, which is the index of the first distant one.
         placed_lights: uint,
         /// Irradiance of distant lights, by which points choose between the groups.
@@ -134,6 +139,12 @@ records! {
         environment_probability: float,
         /// Which hits keep ambient light from a surface, with `WITH_AMBIENT`.
         occlusion: OcclusionRecord,
+        /// Number of leaves of a scene that has few, for `path_megakernel`.
+        few_count: uint,
+        /// Those leaves, then their boxes of eight floats (shaders/trace/few.glsl).
+        few: address,
+        /// Padding to a multiple of 16 bytes.
+        reserved: address,
     }
 
     /// Parameters of the paths of a frame in real time, with `WITH_SIGNAL`. They lie behind the
