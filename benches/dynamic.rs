@@ -41,7 +41,7 @@ fn scene(mesh: TriangleMesh, instances: usize) -> Scene {
         DAffine3::from_scale(DVec3::splat(0.1)) * DAffine3::from_translation(10.0 * at)
     };
     Scene {
-        meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0 }],
+        meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0, source: None }],
         instances: (0..instances)
             .map(|i| Instance { name: String::new(), mesh: 0, object_to_world: place(i) })
             .collect(),

@@ -13,6 +13,8 @@
 #![deny(unsafe_code)]
 
 pub mod accel;
+#[cfg(feature = "bake")]
+pub mod bake;
 #[cfg(feature = "bench")]
 pub mod bench;
 #[cfg(feature = "cli")]

@@ -33,7 +33,7 @@ const LAYERS: &[&[&str]] = &[
     &["renderer"],
     &["terminal"],
     &["report"],
-    &["bench", "compare", "stress", "verify", "viewer"],
+    &["bake", "bench", "compare", "stress", "verify", "viewer"],
     &["cli"],
 ];
 

@@ -301,7 +301,7 @@ fn gpu_clipping_planes() {
 fn mirrored() -> Scene {
     let mut scene = scene("leaf-cards");
     let mut add = |geometry: Geometry, transforms: &[DAffine3]| {
-        scene.meshes.push(Mesh { name: String::new(), geometry, material: 0 });
+        scene.meshes.push(Mesh { name: String::new(), geometry, material: 0, source: None });
         let mesh = scene.meshes.len() - 1;
         scene.instances.extend(transforms.iter().map(|&t| Instance { name: String::new(), mesh, object_to_world: t }));
     };

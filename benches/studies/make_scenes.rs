@@ -65,8 +65,8 @@ fn leaves() -> Scene {
     camera.name = "front".into();
     Scene {
         meshes: vec![
-            Mesh { name: "ground".into(), geometry: Geometry::Triangles(ground(4.0, 1.0)), material: 0 },
-            Mesh { name: "leaf".into(), geometry: Geometry::Triangles(card), material: 1 },
+            Mesh { name: "ground".into(), geometry: Geometry::Triangles(ground(4.0, 1.0)), material: 0, source: None },
+            Mesh { name: "leaf".into(), geometry: Geometry::Triangles(card), material: 1, source: None },
         ],
         instances,
         materials: vec![
@@ -162,8 +162,8 @@ fn courtyard() -> Scene {
     };
     Scene {
         meshes: vec![
-            Mesh { name: "floor".into(), geometry: Geometry::Triangles(ground(5.0, 1.0)), material: 0 },
-            Mesh { name: "block".into(), geometry: Geometry::Triangles(cube), material: 1 },
+            Mesh { name: "floor".into(), geometry: Geometry::Triangles(ground(5.0, 1.0)), material: 0, source: None },
+            Mesh { name: "block".into(), geometry: Geometry::Triangles(cube), material: 1, source: None },
         ],
         instances,
         materials: vec![

@@ -2,6 +2,8 @@
 //! on stdout with `--json`) and an exit code of [`EXIT_CODES`].
 
 mod args;
+#[cfg(feature = "bake")]
+mod bake;
 mod bvh;
 #[cfg(feature = "report")]
 mod bvh_page;
@@ -98,6 +100,9 @@ enum Command {
     Scenes(args::ScenesArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
     Export(args::ExportArgs),
+    /// Bake ambient occlusion into a model: textures or vertex colours; or other maps of its surfaces as images
+    #[cfg(feature = "bake")]
+    Bake(Box<bake::BakeArgs>),
     /// Write an image in other formats: exposed, tone mapped, or one of its layers
     Convert(convert::ConvertArgs),
     /// Check whether two images agree
@@ -240,6 +245,8 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Bvh(args) => return bvh::run(&args),
         Command::Scenes(args) => scenes::run(&args),
         Command::Export(args) => export::run(&args),
+        #[cfg(feature = "bake")]
+        Command::Bake(args) => bake::run(&args),
         Command::Rays(args) => rays::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => completions::run(&args),

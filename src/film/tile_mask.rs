@@ -243,7 +243,7 @@ mod tests {
             object_to_world: DAffine3 { matrix3: matrix, translation: DVec3::X * x - matrix * DVec3::splat(far) },
         };
         Scene {
-            meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0 }],
+            meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0, source: None }],
             instances: vec![place(0.0), place(1.5)],
             materials: vec![Material::default()],
             ..Default::default()

@@ -177,7 +177,7 @@ impl Reduced {
                         Geometry::Triangles(TriangleMesh { indices, ..t.clone() })
                     }
                 };
-                Mesh { name: String::new(), geometry, material: mesh.material }
+                Mesh { name: String::new(), geometry, material: mesh.material, source: None }
             })
             .collect();
         Self { oracle: Oracle::new(&small, scene.origin()), meshes, kept }

@@ -18,5 +18,5 @@ pub mod warp;
 pub use bilinear::BilinearDistribution;
 pub use cumulative::CumulativeTable;
 pub use sequence::Sequence;
-pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};
+pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, sobol_2d, to_unit};
 pub use tables::{best_candidates, blue_noise};

@@ -367,7 +367,7 @@ mod tests {
     }
 
     fn mesh(geometry: Geometry) -> Mesh {
-        Mesh { name: String::new(), geometry, material: 0 }
+        Mesh { name: String::new(), geometry, material: 0, source: None }
     }
 
     fn scene(meshes: Vec<Mesh>, transforms: impl Iterator<Item = DAffine3>) -> Scene {

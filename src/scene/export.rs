@@ -1,6 +1,8 @@
 //! Export of a [`Scene`](crate::scene::Scene): to glTF, which most tools read, and to a plain
 //! triangle soup for other tracers.
 
+pub mod amend;
+mod glb;
 mod gltf;
 mod icosphere;
 mod material;
@@ -10,6 +12,7 @@ mod peer;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+pub use amend::AmendedFile;
 pub use gltf::{companions, export_gltf, is_companion_of};
 pub use mesh_bin::{mesh_bin, read_mesh_bin, write_mesh_bin};
 pub use peer::write_peer_scene;

@@ -13,7 +13,7 @@ pub fn of_scene(scene: &Scene) -> String {
     let mut hash = Fingerprint(Xxh3::new());
 
     // patterns without `..`: a new field must be considered here
-    for Mesh { name: _, geometry, material } in &scene.meshes {
+    for Mesh { name: _, source: _, geometry, material } in &scene.meshes {
         hash.count(*material);
         match geometry {
             Geometry::Triangles(TriangleMesh {

@@ -158,7 +158,7 @@ impl LightSpec {
             emissive: self.power,
             ..Material::default()
         });
-        scene.meshes.push(Mesh { name: "--light".into(), geometry, material });
+        scene.meshes.push(Mesh { name: "--light".into(), geometry, material, source: None });
         let object_to_world = DAffine3::from_translation(position);
         scene.instances.push(Instance { name: "--light".into(), mesh, object_to_world });
     }

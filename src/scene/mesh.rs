@@ -141,4 +141,20 @@ pub struct Mesh {
     pub geometry: Geometry,
     /// Index into [`super::Scene::materials`].
     pub material: usize,
+    /// Where a glTF file has it; `None` where it comes from elsewhere.
+    pub source: Option<MeshSource>,
+}
+
+/// A primitive of a glTF file, by the file's own numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshSource {
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Index of the primitive in the mesh.
+    pub primitive: usize,
+    /// Index of its material, whatever the variant; `None` for the default material.
+    pub material: Option<usize>,
+    /// Numbers of the sets of texture coordinates that were read, in the order of
+    /// [`TriangleMesh::texcoord_set`].
+    pub texcoord_sets: Vec<u32>,
 }

@@ -33,7 +33,7 @@ pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, Portal};
 pub use lights::LightKind;
 pub use material::{AlphaMode, Material, TextureSlot};
-pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
+pub use mesh::{Geometry, Mesh, MeshSource, Sphere, TriangleMesh};
 pub use motion::Motion;
 pub use orbit::Orbit;
 pub use settings::SceneSettings;

@@ -11,6 +11,10 @@ pub static AO_TRACE_ANY: StreamShaders = StreamShaders::new("ao_trace", Any, Gen
 pub static AO_TRACE_CLOSEST: StreamShaders = StreamShaders::new("ao_trace", Closest, Generated);
 /// Camera rays of auxiliary outputs.
 pub static AOV_CLOSEST: StreamShaders = StreamShaders::new("aov", Closest, Camera);
+/// Occlusion rays from the points of texels, for ambient occlusion without a falloff.
+pub static BAKE_ANY: StreamShaders = StreamShaders::new("bake", Any, Generated);
+/// Occlusion rays from the points of texels, with a falloff, and rays of thickness.
+pub static BAKE_CLOSEST: StreamShaders = StreamShaders::new("bake", Closest, Generated);
 /// Camera rays of a frame's G-buffer.
 pub static GBUFFER_CLOSEST: StreamShaders = StreamShaders::new("gbuffer", Closest, Camera);
 /// Shadow rays of Larsen (2019).
@@ -47,6 +51,8 @@ pub const STREAMS: &[&StreamShaders] = &[
     &AO_TRACE_ANY,
     &AO_TRACE_CLOSEST,
     &AOV_CLOSEST,
+    &BAKE_ANY,
+    &BAKE_CLOSEST,
     &GBUFFER_CLOSEST,
     &LARSEN_LIGHT_ANY,
     &LARSEN_OCCLUSION_CLOSEST,
@@ -66,6 +72,8 @@ pub const STREAMS: &[&StreamShaders] = &[
 
 /// The mean over frames whose samples lie at different places within the pixels.
 pub static ANTIALIAS: ComputeShader = ComputeShader::new("antialias");
+/// The samples of a launch, added to the sums of the points of texels.
+pub static BAKE_SUM: ComputeShader = ComputeShader::new("bake_sum");
 /// Radiance of each pixel, of its filtered parts.
 pub static COMPOSE: ComputeShader = ComputeShader::new("compose");
 /// The spatial filter of radiance.
@@ -118,6 +126,7 @@ pub static TEMPORAL: ComputeShader = ComputeShader::new("temporal");
 /// The passes that trace no rays.
 pub const COMPUTE: &[&ComputeShader] = &[
     &ANTIALIAS,
+    &BAKE_SUM,
     &COMPOSE,
     &DENOISE,
     &DISPLAY,

@@ -37,7 +37,7 @@ pub const SECTION: Section = Section {
 pub fn scene_of(parts: Vec<(Geometry, Vec<DAffine3>)>) -> Scene {
     let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
     for (geometry, places) in parts {
-        scene.meshes.push(Mesh { name: String::new(), geometry, material: 0 });
+        scene.meshes.push(Mesh { name: String::new(), geometry, material: 0, source: None });
         let mesh = scene.meshes.len() - 1;
         scene.instances.extend(places.into_iter().map(|object_to_world| Instance {
             name: String::new(),

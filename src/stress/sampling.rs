@@ -36,7 +36,7 @@ pub fn scene_of(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
 /// Adds a shape with a material of its own.
 pub fn add(scene: &mut Scene, geometry: Geometry, material: Material) {
     let k = scene.meshes.len();
-    scene.meshes.push(Mesh { name: format!("mesh {k}"), geometry, material: scene.materials.len() });
+    scene.meshes.push(Mesh { name: format!("mesh {k}"), geometry, material: scene.materials.len(), source: None });
     scene.materials.push(material);
     scene.instances.push(Instance { name: format!("mesh {k}"), mesh: k, object_to_world: DAffine3::IDENTITY });
 }

@@ -141,7 +141,12 @@ fn gpu_texture_coordinates_of_spheres() {
     let device = device();
     let mut scene = Scene::default();
     let material = add_globe(&mut scene, Filter::Nearest);
-    scene.meshes.push(Mesh { name: String::new(), geometry: shapes::sphere(DVec3::new(3.0, 0.0, 0.0), 0.5), material });
+    scene.meshes.push(Mesh {
+        name: String::new(),
+        geometry: shapes::sphere(DVec3::new(3.0, 0.0, 0.0), 0.5),
+        material,
+        source: None,
+    });
     // turned by a quarter about x: the pole at z is at -y
     let turn = DAffine3::from_rotation_x(0.5 * PI);
     scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: turn });
@@ -183,7 +188,7 @@ fn everything() -> Scene {
     let mut scene = scene("leaf-cards");
     let globe = add_globe(&mut scene, Filter::Linear);
     let mut add = |geometry: Geometry, material: usize, transforms: &[DAffine3]| {
-        scene.meshes.push(Mesh { name: String::new(), geometry, material });
+        scene.meshes.push(Mesh { name: String::new(), geometry, material, source: None });
         let mesh = scene.meshes.len() - 1;
         scene.instances.extend(transforms.iter().map(|&t| Instance { name: String::new(), mesh, object_to_world: t }));
     };

@@ -398,7 +398,7 @@ fn gpu_ao_plane_is_one() {
 
 fn mesh_scene(mesh: TriangleMesh, camera: Camera) -> Scene {
     Scene {
-        meshes: vec![Mesh { name: "mesh".into(), geometry: Geometry::Triangles(mesh), material: 0 }],
+        meshes: vec![Mesh { name: "mesh".into(), geometry: Geometry::Triangles(mesh), material: 0, source: None }],
         instances: vec![Instance { name: "mesh".into(), mesh: 0, object_to_world: DAffine3::IDENTITY }],
         materials: vec![Material::default()],
         cameras: vec![camera],

@@ -5,6 +5,7 @@
 mod common;
 
 mod aov;
+mod baking;
 mod closed_forms;
 mod film;
 mod images;

@@ -5,6 +5,7 @@ mod common;
 
 #[cfg(unix)]
 mod abuse;
+mod bake;
 #[cfg(unix)]
 mod bench_ao;
 mod bench_frames;

@@ -91,6 +91,7 @@ fn scene() -> Scene {
         name: name.into(),
         geometry: Geometry::Triangles(triangles),
         material,
+        source: None,
     };
     let bare = TriangleMesh { positions: two_triangles().positions, indices: vec![[0, 2, 1]], ..Default::default() };
     let far = DAffine3::from_scale_rotation_translation(
@@ -241,8 +242,8 @@ fn spheres_are_tessellated() {
     let bulb = Sphere { center: Vec3::ZERO, radius: 0.5 };
     let scene = Scene {
         meshes: vec![
-            Mesh { name: "ball".into(), geometry: Geometry::Spheres(vec![sphere]), material: 0 },
-            Mesh { name: "bulb".into(), geometry: Geometry::Spheres(vec![bulb]), material: 1 },
+            Mesh { name: "ball".into(), geometry: Geometry::Spheres(vec![sphere]), material: 0, source: None },
+            Mesh { name: "bulb".into(), geometry: Geometry::Spheres(vec![bulb]), material: 1, source: None },
         ],
         instances: vec![
             Instance { name: "ball".into(), mesh: 0, object_to_world: DAffine3::from_scale(DVec3::splat(2.0)) },

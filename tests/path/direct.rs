@@ -329,7 +329,7 @@ fn gpu_many_lights() {
         let mut scene = floor_and(Vec::new());
         for (k, tile) in tiles.clone().enumerate() {
             scene.materials.push(emitter(strength));
-            scene.meshes.push(Mesh { name: format!("tile {k}"), geometry: tile, material: 1 + k });
+            scene.meshes.push(Mesh { name: format!("tile {k}"), geometry: tile, material: 1 + k, source: None });
             scene.instances.push(Instance {
                 name: format!("tile {k}"),
                 mesh: 1 + k,

@@ -84,7 +84,7 @@ fn everything() -> Scene {
     ] {
         let mesh = scene.meshes.len();
         scene.materials.push(material);
-        scene.meshes.push(Mesh { name: String::new(), geometry, material: mesh });
+        scene.meshes.push(Mesh { name: String::new(), geometry, material: mesh, source: None });
         scene.instances.push(Instance { name: String::new(), mesh, object_to_world: DAffine3::IDENTITY });
     }
     // 16 bits a channel, half of it transparent

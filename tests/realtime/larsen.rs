@@ -79,6 +79,7 @@ fn gpu_larsen_traces_a_quarter_of_the_pixels_and_none_that_is_lit() {
         name: "screen".into(),
         geometry: shapes::rectangle(DVec3::new(-1.5, 0.6, 0.0), DVec3::Y * 0.6, DVec3::Z * 0.8),
         material: 0,
+        source: None,
     });
     scene.instances.push(skylit::scene::Instance {
         name: "screen".into(),

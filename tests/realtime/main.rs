@@ -121,7 +121,12 @@ fn assert_sound(what: &str, realtime: &Realtime) {
 fn scene_of(meshes: Vec<TriangleMesh>, camera: Camera) -> Scene {
     let mut scene = Scene { materials: vec![Material::default()], cameras: vec![camera], ..Scene::default() };
     for (mesh, geometry) in meshes.into_iter().enumerate() {
-        scene.meshes.push(Mesh { name: format!("mesh {mesh}"), geometry: Geometry::Triangles(geometry), material: 0 });
+        scene.meshes.push(Mesh {
+            name: format!("mesh {mesh}"),
+            geometry: Geometry::Triangles(geometry),
+            material: 0,
+            source: None,
+        });
         scene.instances.push(Instance { name: format!("mesh {mesh}"), mesh, object_to_world: DAffine3::IDENTITY });
     }
     scene

@@ -72,7 +72,7 @@ fn growing() -> Scene {
     let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
     let cube = skylit::scene::builtin::shapes::cuboid(DVec3::splat(-0.1 * size), DVec3::splat(0.1 * size));
     assert!(matches!(cube, Geometry::Triangles(_)));
-    scene.meshes.push(skylit::scene::Mesh { name: "cube".into(), geometry: cube, material: 0 });
+    scene.meshes.push(skylit::scene::Mesh { name: "cube".into(), geometry: cube, material: 0, source: None });
     let mut parts = RigParts { instances: vec![None; scene.instances.len()], ..RigParts::default() };
     parts.cameras = vec![None; scene.cameras.len()];
     let mut channels = Vec::new();

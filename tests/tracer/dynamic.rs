@@ -176,7 +176,12 @@ fn sphere_on_a_plane() -> (Scene, usize) {
     let (material, mut instance) = (scene.meshes[0].material, scene.instances[0].clone());
     let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
     let middle = scene.bounds().map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) * 0.5);
-    scene.meshes.push(skylit::scene::Mesh { name: "sphere".into(), geometry: shapes::icosphere(1.0, 5), material });
+    scene.meshes.push(skylit::scene::Mesh {
+        name: "sphere".into(),
+        geometry: shapes::icosphere(1.0, 5),
+        material,
+        source: None,
+    });
     if let Geometry::Triangles(t) = &mut scene.meshes[mesh].geometry {
         // a vertex that no triangle uses and that nothing may take notice of
         t.positions.push(Vec3::splat(1e30));

@@ -40,7 +40,7 @@ fn random_turn(i: u32, k: u32) -> DQuat {
 
 fn scene(geometry: Geometry, places: impl IntoIterator<Item = DAffine3>) -> Scene {
     let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
-    scene.meshes.push(Mesh { name: String::new(), geometry, material: 0 });
+    scene.meshes.push(Mesh { name: String::new(), geometry, material: 0, source: None });
     let place = |object_to_world| Instance { name: String::new(), mesh: 0, object_to_world };
     scene.instances.extend(places.into_iter().map(place));
     scene
@@ -174,7 +174,7 @@ fn gpu_kernel_pairs_with_alpha() {
     let mut scene = by_name("leaf-cards").unwrap();
     let masked = scene.meshes.iter().find(|m| m.name.contains("tuft 1")).expect("a mesh with a mask").material;
     let name = String::new;
-    let mesh = |material| Mesh { name: name(), geometry: Geometry::Triangles(folded_quads()), material };
+    let mesh = |material| Mesh { name: name(), geometry: Geometry::Triangles(folded_quads()), material, source: None };
     scene.meshes = vec![mesh(masked), mesh(0)];
     let place = |mesh, object_to_world| Instance { name: name(), mesh, object_to_world };
     scene.instances =

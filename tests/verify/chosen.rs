@@ -119,7 +119,7 @@ fn gpu_what_was_chosen_does_not_follow_the_scene() {
         let (lo, hi) = scene.bounds().unwrap();
         let at = lo + (hi - lo) * DVec3::new(0.9, 1.4, 0.1);
         let geometry = Geometry::Triangles(small_box(at, 0.02 * (hi - lo).length()));
-        scene.meshes.push(Mesh { name: "more".into(), geometry, material: 0 });
+        scene.meshes.push(Mesh { name: "more".into(), geometry, material: 0, source: None });
         let mesh = scene.meshes.len() - 1;
         scene.instances.push(Instance { name: "more".into(), mesh, object_to_world: DAffine3::IDENTITY });
     };

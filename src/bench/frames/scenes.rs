@@ -139,7 +139,7 @@ fn add_plane(scene: &mut Scene, (lo, hi): (DVec3, DVec3)) {
     let middle = DVec3::new(0.5 * (lo.x + hi.x), lo.y, 0.5 * (lo.z + hi.z));
     let geometry: Geometry = shapes::floor(middle, PLANE * (hi - lo).max_element());
     scene.materials.push(Material { name: "plane".into(), ..Default::default() });
-    scene.meshes.push(Mesh { name: "plane".into(), geometry, material: scene.materials.len() - 1 });
+    scene.meshes.push(Mesh { name: "plane".into(), geometry, material: scene.materials.len() - 1, source: None });
     let mesh = scene.meshes.len() - 1;
     scene.instances.push(Instance { name: "plane".into(), mesh, object_to_world: DAffine3::IDENTITY });
 }

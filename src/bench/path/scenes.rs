@@ -101,7 +101,12 @@ fn ball_scene(ball: &Ball) -> Scene {
     };
     Scene {
         name: ball.name.into(),
-        meshes: vec![Mesh { name: ball.name.into(), geometry: shapes::sphere(DVec3::ZERO, 1.0), material: 0 }],
+        meshes: vec![Mesh {
+            name: ball.name.into(),
+            geometry: shapes::sphere(DVec3::ZERO, 1.0),
+            material: 0,
+            source: None,
+        }],
         instances: vec![Instance { name: ball.name.into(), mesh: 0, object_to_world: DAffine3::IDENTITY }],
         materials: vec![material],
         cameras: vec![Camera::look_at(DVec3::new(0.0, 0.6, 3.2), DVec3::ZERO, DVec3::Y, 45f64.to_radians())],

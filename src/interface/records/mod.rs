@@ -3,6 +3,7 @@
 pub mod albedo;
 pub mod ao;
 pub mod aov;
+pub mod bake;
 pub mod block;
 pub mod denoise;
 pub mod display;
@@ -26,13 +27,14 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 23] = [
+pub const FILES: [&File; 24] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
     &shading::FILE,
     &block::FILE,
     &ao::FILE,
+    &bake::FILE,
     &film::FILE,
     &super::path_options::FILE,
     &lights::FILE,

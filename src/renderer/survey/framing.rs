@@ -417,7 +417,7 @@ mod tests {
         let (lo, hi) = BOUNDS;
         let (middle, size) = ((lo + hi) * 0.5, hi - lo);
         let at = |y: f64| shapes::rectangle(DVec3::new(middle.x, y, middle.z), DVec3::X * size.x, DVec3::Z * size.z);
-        let mesh = |y| Mesh { name: String::new(), geometry: at(y), material: 0 };
+        let mesh = |y| Mesh { name: String::new(), geometry: at(y), material: 0, source: None };
         let instance = |mesh| Instance { name: String::new(), mesh, object_to_world: DAffine3::IDENTITY };
         Scene {
             materials: vec![Material::default()],

@@ -309,6 +309,7 @@ mod tests {
             name: String::new(),
             geometry: Geometry::Spheres(vec![sphere]),
             material: dot.materials.len() - 1,
+            source: None,
         };
         dot.meshes.push(mesh);
         let mesh = dot.meshes.len() - 1;

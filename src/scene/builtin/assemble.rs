@@ -18,7 +18,7 @@ impl Scene {
 
     /// Adds a mesh without placing it; returns its index.
     pub(super) fn add_mesh(&mut self, name: &str, geometry: Geometry, material: usize) -> usize {
-        self.meshes.push(Mesh { name: name.to_owned(), geometry, material });
+        self.meshes.push(Mesh { name: name.to_owned(), geometry, material, source: None });
         self.meshes.len() - 1
     }
 

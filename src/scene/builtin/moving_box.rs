@@ -33,7 +33,7 @@ pub struct Mover {
 pub fn build_room() -> (Scene, Mover) {
     let mut scene = Scene { name: "room".into(), materials: vec![Material::default()], ..Default::default() };
     let mut add = |name: &str, geometry: Geometry, at: DVec3| {
-        scene.meshes.push(Mesh { name: name.into(), geometry, material: 0 });
+        scene.meshes.push(Mesh { name: name.into(), geometry, material: 0, source: None });
         let (mesh, object_to_world) = (scene.meshes.len() - 1, placed(at));
         scene.instances.push(Instance { name: name.into(), mesh, object_to_world });
         scene.instances.len() - 1

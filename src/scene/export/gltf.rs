@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
-use super::{ExportStats, icosphere, material, write_buffered};
+use super::{ExportStats, glb, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::VertexData;
 use crate::scene::{
@@ -49,20 +49,7 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
 
     // one file, padded to words
     if embed {
-        write_buffered(path, |out| {
-            let json_size = text.len().next_multiple_of(4);
-            let bin_size = bin.len().next_multiple_of(4);
-            let words = [2, 12 + 8 + json_size + 8 + bin_size, json_size].map(|n| (n as u32).to_le_bytes());
-            out.write_all(b"glTF")?;
-            out.write_all(&words.concat())?;
-            out.write_all(b"JSON")?;
-            out.write_all(text.as_bytes())?;
-            out.write_all(&b"    "[..json_size - text.len()])?;
-            out.write_all(&(bin_size as u32).to_le_bytes())?;
-            out.write_all(b"BIN\0")?;
-            out.write_all(&bin)?;
-            out.write_all(&[0; 4][..bin_size - bin.len()])
-        })?;
+        glb::write(path, text.as_bytes(), &[&bin])?;
         return Ok(written);
     }
 
@@ -526,7 +513,7 @@ fn punctual(light: &Light) -> Option<Value> {
 }
 
 /// A file name as a URI.
-fn encode(name: &str) -> String {
+pub(super) fn encode(name: &str) -> String {
     let mut out = String::new();
     for b in name.bytes() {
         match b {

@@ -135,7 +135,7 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let geometry = Geometry::Triangles(TriangleMesh { positions, indices, ..Default::default() });
     Ok(Scene {
-        meshes: vec![Mesh { name: name.clone(), geometry, material: 0 }],
+        meshes: vec![Mesh { name: name.clone(), geometry, material: 0, source: None }],
         instances: vec![Instance { name: name.clone(), mesh: 0, object_to_world: DAffine3::IDENTITY }],
         materials: vec![Material::default()],
         name,

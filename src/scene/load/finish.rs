@@ -168,7 +168,7 @@ fn bake_singular(scene: &mut Scene, budget: &Budget) {
             }
             Geometry::Spheres(_) => Geometry::Spheres(Vec::new()),
         };
-        let mesh = Mesh { name: source.name.clone(), geometry, material: source.material };
+        let mesh = Mesh { name: source.name.clone(), geometry, material: source.material, source: None };
         instance.mesh = scene.meshes.len();
         instance.object_to_world = DAffine3::IDENTITY;
         scene.meshes.push(mesh);
@@ -251,8 +251,9 @@ fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Def
     notes
 }
 
-/// Whether two corners coincide or all three lie on a line, exactly, in f64.
-fn is_degenerate(t: [u32; 3], positions: &[glam::Vec3]) -> bool {
+/// Whether two corners coincide or all three lie on a line, exactly, in f64: such triangles are
+/// dropped.
+pub fn is_degenerate(t: [u32; 3], positions: &[glam::Vec3]) -> bool {
     if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
         return true;
     }

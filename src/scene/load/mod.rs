@@ -35,9 +35,13 @@ use std::path::{Path, PathBuf};
 pub use camera_path::load_camera_path;
 pub use confine::Confine;
 pub use environment::{load_environment, load_environment_with};
+pub use finish::is_degenerate;
+pub use gltf::source::{SourceFile, SourcePrimitive, StoredAttribute};
 pub use options::{
     GeometryOptions, LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, UpAxis, is_in_progress,
 };
+
+pub use tangents::tangents_of_corners;
 
 use crate::error::{Error, Result};
 use crate::memory::Budget;

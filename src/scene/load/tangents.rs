@@ -63,6 +63,24 @@ pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> 
     source
 }
 
+/// The tangent at each corner of each triangle for these texture coordinates of the corners: unit
+/// length, with the handedness in w.
+pub fn tangents_of_corners(mesh: &TriangleMesh, corners: &[[Vec2; 3]]) -> Vec<Vec4> {
+    let vertices: Vec<usize> = mesh.indices.iter().flatten().map(|&v| v as usize).collect();
+    let mut apart = TriangleMesh {
+        positions: vertices.iter().map(|&v| mesh.positions[v]).collect(),
+        indices: (0..mesh.indices.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        normals: if mesh.normals.is_empty() { Vec::new() } else { vertices.iter().map(|&v| mesh.normals[v]).collect() },
+        ..TriangleMesh::default()
+    };
+    apart.texcoords[0] = corners.iter().flatten().copied().collect();
+    if apart.normals.is_empty() {
+        normals::make_flat(&mut apart);
+    }
+    let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY };
+    corner_tangents(&apart, Some(slot))
+}
+
 /// The tangent at each corner of each triangle, from the texture coordinates of a texture,
 /// transformed as the texture's are: what a map says about right and up is of its own image. Where
 /// these are the same everywhere, or there is no texture, from the first set that is not. Where

@@ -129,6 +129,7 @@ impl Loader<'_> {
             name: name.to_owned(),
             geometry: Geometry::Spheres(vec![sphere]),
             material: scene.materials.len(),
+            source: None,
         });
         scene.materials.push(Material { name: name.to_owned(), ..material });
     }

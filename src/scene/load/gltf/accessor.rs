@@ -113,6 +113,15 @@ impl Indices<'_> {
     }
 }
 
+/// Elements as a file stores them, without gaps.
+pub(super) struct StoredElements {
+    pub bytes: Vec<u8>,
+    pub count: usize,
+    pub shape: Type,
+    pub component: ComponentType,
+    pub normalized: bool,
+}
+
 impl<'a> Reader<'a> {
     fn accessor(&self, index: Index<Accessor>) -> Result<&'a Accessor, String> {
         let all = &self.document.accessors;
@@ -252,6 +261,28 @@ impl<'a> Reader<'a> {
             }
         }
         Ok(out)
+    }
+
+    /// Reads an accessor's elements as they are stored, one after the other.
+    pub(super) fn stored(&self, index: Index<Accessor>) -> Result<StoredElements, String> {
+        let accessor = self.accessor(index)?;
+        let shape = valid(accessor.type_).ok_or_else(|| format!("accessor {index} is of an unknown type"))?;
+        let named = |e: String| format!("accessor {index}: {e}");
+        let base = self.base(index, shape.multiplicity()).map_err(named)?;
+        let (count, size) = (base.count as usize, shape.multiplicity() * base.component.size());
+        self.take(base.count.saturating_mul(size as u64), base.count)?;
+        let mut bytes = match base.elements {
+            Some(Elements { bytes, stride }) => {
+                (0..count).flat_map(|i| &bytes[i * stride..][..size]).copied().collect()
+            }
+            None => vec![0; count * size],
+        };
+        if let Some((at, values)) = self.sparse(accessor, size).map_err(named)? {
+            for (k, i) in at.into_iter().enumerate() {
+                bytes[i * size..][..size].copy_from_slice(&values.bytes[k * values.stride..][..size]);
+            }
+        }
+        Ok(StoredElements { bytes, count, shape, component: base.component, normalized: accessor.normalized })
     }
 
     /// Reads a scalar accessor of unsigned integers.

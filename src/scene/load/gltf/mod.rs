@@ -23,6 +23,7 @@ mod node;
 mod pointer;
 mod rig;
 mod skin;
+pub(super) mod source;
 mod texture;
 mod uri;
 mod values;
@@ -44,7 +45,7 @@ use super::compact;
 use super::options::Loading;
 use crate::error::{Error, Result};
 use crate::scene::material::{VariantMaterials, all_variants};
-use crate::scene::{FileExtension, Geometry, Instance, Material, Mesh, Scene};
+use crate::scene::{FileExtension, Geometry, Instance, Material, Mesh, MeshSource, Scene};
 
 /// Extensions that skylit reads, and whether this program was built with what they need.
 const KNOWN: &[(&str, bool)] = &[
@@ -289,7 +290,14 @@ impl Meshes<'_> {
             let place = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
             let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
             made.push(LoadedMesh { mesh: scene.meshes.len(), place });
-            scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
+            let source = MeshSource {
+                mesh: index,
+                primitive: nth,
+                material: primitive.material.map(|m| m.value()),
+                texcoord_sets: sets,
+            };
+            let geometry = Geometry::Triangles(triangles);
+            scene.meshes.push(Mesh { name, geometry, material, source: Some(source) });
         }
         self.primitives.insert(wanted.clone(), made.clone());
         Ok(made)

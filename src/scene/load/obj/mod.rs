@@ -88,7 +88,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         let mesh = scene.meshes.len();
         let object_to_world = DAffine3::from_translation(origin);
         scene.instances.push(Instance { name: name.clone(), mesh, object_to_world });
-        scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
+        scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material, source: None });
     }
     Ok(scene)
 }

@@ -1,0 +1,229 @@
+//! Which textures a model gets: one for each material, and where its surfaces lie in it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::Vec2;
+
+use super::texels::Layout;
+use super::unwrap::{self, UnwrappedMesh};
+use super::{BakeSettings, TexcoordChoice};
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::scene::load::SourceFile;
+use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
+
+/// Share of the places of a texture that may show two surfaces in coordinates that count as unique.
+const MAX_OVERLAP: f64 = 2e-3;
+/// Share of a surface's area that may lie at no place of the texture.
+const MAX_LOST: f64 = 1e-2;
+
+/// A texture, and the surfaces that it shows.
+pub struct PlannedTexture {
+    /// Name of the material; its number where it has none.
+    pub name: String,
+    /// Index of the material in the glTF file; `None` for primitives without one, and for files of
+    /// other formats.
+    pub material: Option<usize>,
+    /// Width and height, texels.
+    pub size: [u32; 2],
+    /// Number of the set of texture coordinates.
+    pub texcoord: u32,
+    /// Where texture coordinates were made, new vertices of the primitives; else empty.
+    pub unwrapped: Vec<UnwrappedMesh>,
+    /// The surfaces.
+    pub surfaces: Vec<Surface>,
+    /// Sentences for the user.
+    pub remarks: Vec<String>,
+}
+
+/// A mesh in a texture.
+pub struct Surface {
+    /// Index of the scene's mesh.
+    pub mesh: usize,
+    /// The scene's instances that show it.
+    pub instances: Vec<usize>,
+    /// Texture coordinates of the corners of each triangle.
+    pub corners: Vec<[Vec2; 3]>,
+}
+
+/// The triangles of a mesh; `None` for spheres.
+pub fn triangles_of(mesh: &Mesh) -> Option<&TriangleMesh> {
+    match &mesh.geometry {
+        Geometry::Triangles(triangles) => Some(triangles),
+        Geometry::Spheres(_) => None,
+    }
+}
+
+/// The meshes that are baked, by material: of those that are the same primitive of a file the first
+/// with an instance.
+pub fn meshes_by_material(scene: &Scene) -> Vec<(Option<usize>, Vec<usize>)> {
+    let mut groups: BTreeMap<(usize, Option<usize>), Vec<usize>> = BTreeMap::new();
+    let mut known = BTreeSet::new();
+    for (index, mesh) in scene.meshes.iter().enumerate() {
+        if triangles_of(mesh).is_none() || instances_of(scene, index).is_empty() {
+            continue;
+        }
+        match &mesh.source {
+            Some(source) => {
+                if known.insert((source.mesh, source.primitive)) {
+                    let key = (source.material.unwrap_or(usize::MAX), source.material);
+                    groups.entry(key).or_default().push(index);
+                }
+            }
+            None => groups.entry((mesh.material, None)).or_default().push(index),
+        }
+    }
+    groups.into_iter().map(|((_, material), meshes)| (material, meshes)).collect()
+}
+
+/// The instances of a mesh that are there.
+pub fn instances_of(scene: &Scene, mesh: usize) -> Vec<usize> {
+    let shown =
+        scene.instances.iter().enumerate().filter(|(i, instance)| instance.mesh == mesh && !scene.hidden.contains(i));
+    shown.map(|(i, _)| i).collect()
+}
+
+/// Plans the textures of a scene. `file`: the glTF file that it was read from, which gets texture
+/// coordinates where it has no unique ones; `control` hears of making them.
+///
+/// # Errors
+/// [`Error::Interrupted`], and [`Error::Usage`] where there are no unique coordinates, and none can be made.
+pub fn plan(
+    scene: &Scene,
+    file: Option<&SourceFile>,
+    settings: &BakeSettings,
+    control: &mut dyn Control,
+) -> Result<Vec<PlannedTexture>> {
+    let mut textures = Vec::new();
+    for (number, (material, meshes)) in meshes_by_material(scene).into_iter().enumerate() {
+        let first = &scene.materials[scene.meshes[meshes[0]].material];
+        let name = if first.name.is_empty() { format!("material{number}") } else { first.name.clone() };
+        if settings.materials.iter().any(|wanted| !wanted.is_empty()) && !settings.materials.contains(&name) {
+            continue;
+        }
+        textures.push(plan_texture(scene, file, settings, &name, material, &meshes, control)?);
+    }
+    if let Some(missing) = settings.materials.iter().find(|wanted| !textures.iter().any(|t| t.name == **wanted)) {
+        return Err(Error::Usage(format!("--material {missing}: no surface has a material of that name")));
+    }
+    if textures.is_empty() {
+        return Err(Error::Scene(format!("{}: has no triangles, and nothing else has texels", scene.name)));
+    }
+    Ok(textures)
+}
+
+/// Plans the texture of a material.
+fn plan_texture(
+    scene: &Scene,
+    file: Option<&SourceFile>,
+    settings: &BakeSettings,
+    name: &str,
+    material: Option<usize>,
+    meshes: &[usize],
+    control: &mut dyn Control,
+) -> Result<PlannedTexture> {
+    // a set that the file has, if its coordinates are unique
+    let mut remarks = Vec::new();
+    let candidates: &[u32] = match settings.texcoords {
+        TexcoordChoice::Auto => &[1, 0],
+        TexcoordChoice::Set(ref set) => std::slice::from_ref(set),
+        TexcoordChoice::Unwrap => &[],
+    };
+    for &set in candidates {
+        let Some(surfaces) = surfaces_by_set(scene, meshes, set) else { continue };
+        match fault(scene, settings.size, &surfaces) {
+            None => {
+                return Ok(PlannedTexture {
+                    name: name.to_owned(),
+                    material,
+                    size: settings.size,
+                    texcoord: set,
+                    unwrapped: Vec::new(),
+                    surfaces,
+                    remarks,
+                });
+            }
+            Some(fault) => remarks.push(format!("material `{name}`: texture coordinates {set} {fault}")),
+        }
+    }
+    if let TexcoordChoice::Set(set) = settings.texcoords {
+        let reason = remarks
+            .pop()
+            .unwrap_or_else(|| format!("material `{name}`: not all meshes have texture coordinates {set}"));
+        return Err(Error::Usage(format!("{reason}: --texcoord unwrap makes some that are unique")));
+    }
+
+    // else coordinates of its own, which only a file can hold
+    let Some(file) = file else {
+        let reason = remarks.pop().unwrap_or_else(|| format!("material `{name}`: has no texture coordinates"));
+        return Err(Error::Usage(format!(
+            "{reason}: bake into a model, -o NAME.glb, which gets texture coordinates that are unique"
+        )));
+    };
+    let unwrapped = unwrap::unwrap(scene, file, meshes, settings, name, control)?;
+    remarks.push(format!(
+        "material `{name}`: {} charts in TEXCOORD_{}, {:.0} % of the texture",
+        unwrapped.charts,
+        unwrapped.texcoord,
+        100.0 * unwrapped.utilization
+    ));
+    let surface = |(&mesh, made): (&usize, &UnwrappedMesh)| Surface {
+        mesh,
+        instances: instances_of(scene, mesh),
+        corners: made.scene_corners.clone(),
+    };
+    Ok(PlannedTexture {
+        name: name.to_owned(),
+        material,
+        size: unwrapped.size,
+        texcoord: unwrapped.texcoord,
+        surfaces: meshes.iter().zip(&unwrapped.meshes).map(surface).collect(),
+        unwrapped: unwrapped.meshes,
+        remarks,
+    })
+}
+
+/// The meshes by a set of texture coordinates, which all of them must have.
+fn surfaces_by_set(scene: &Scene, meshes: &[usize], set: u32) -> Option<Vec<Surface>> {
+    let surface = |&mesh: &usize| {
+        let triangles = triangles_of(&scene.meshes[mesh])?;
+        let place = match &scene.meshes[mesh].source {
+            Some(source) => source.texcoord_sets.iter().position(|s| *s == set)?,
+            None => set as usize,
+        };
+        let texcoords = triangles.texcoord_set(place);
+        if texcoords.is_empty() {
+            return None;
+        }
+        let corners = triangles.indices.iter().map(|t| t.map(|v| texcoords[v as usize])).collect();
+        Some(Surface { mesh, instances: instances_of(scene, mesh), corners })
+    };
+    meshes.iter().map(surface).collect()
+}
+
+/// Why texture coordinates are not unique, in words; `None` if they are.
+fn fault(scene: &Scene, size: [u32; 2], surfaces: &[Surface]) -> Option<String> {
+    // surfaces of no extent in the texture, or that repeat it
+    let (mut area, mut lost, mut repeated) = (0.0, 0.0, 0.0);
+    for surface in surfaces {
+        let triangles = triangles_of(&scene.meshes[surface.mesh])?;
+        for (t, corners) in triangles.indices.iter().zip(&surface.corners) {
+            let [a, b, c] = t.map(|v| triangles.positions[v as usize].as_dvec3());
+            let own = (b - a).cross(c - a).length();
+            let [least, greatest] = [Vec2::min as fn(Vec2, Vec2) -> Vec2, Vec2::max]
+                .map(|pick| corners.iter().copied().reduce(pick).unwrap_or_default());
+            area += own;
+            lost += if (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]) == 0.0 { own } else { 0.0 };
+            repeated += if (greatest - least).max_element() > 1.0 + 1e-4 { own } else { 0.0 };
+        }
+    }
+    if lost > MAX_LOST * area {
+        return Some(format!("show no texels on {:.0} % of the surface", 100.0 * lost / area));
+    }
+    if repeated > 0.0 {
+        return Some(format!("repeat the texture on {:.0} % of the surface", 100.0 * repeated / area));
+    }
+    let corners: Vec<&[[Vec2; 3]]> = surfaces.iter().map(|s| &s.corners[..]).collect();
+    let overlap = Layout::new(size, &corners).overlap();
+    (overlap > MAX_OVERLAP).then(|| format!("overlap: {:.1} % of the texels show several places", 100.0 * overlap))
+}

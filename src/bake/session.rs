@@ -1,0 +1,160 @@
+//! Baking of all textures, or of the vertices of all meshes, of a scene.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::map::{self, BakedMap, Traced};
+use super::plan::{PlannedTexture, meshes_by_material};
+use super::vertices::{self, BakedVertices};
+use super::{BakeSettings, Occluders};
+use crate::accel::flatten::FlatScene;
+use crate::error::Result;
+use crate::film::Control;
+use crate::gpu::Device;
+use crate::integrators::ao::Hemisphere;
+use crate::scene::builtin::shapes;
+use crate::scene::load::SourceFile;
+use crate::scene::{Instance, Mesh, Scene};
+use crate::tracer::{DeviceSettings, Needs, Tracer};
+
+/// Side of the ground plane, in diagonals of the scene.
+const GROUND: f64 = 20.0;
+
+/// A scene and the device that bakes it.
+pub struct BakeSession<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The device.
+    pub device: &'a Arc<Device>,
+    /// The tracer and its options.
+    pub tracing: &'a DeviceSettings,
+    /// What is baked.
+    pub settings: &'a BakeSettings,
+    /// A detailed model that is traced in place of the scene, and how far from the scene's surfaces
+    /// its own may be, in scene units.
+    pub detailed: Option<(&'a Scene, f64)>,
+}
+
+impl BakeSession<'_> {
+    /// Bakes each texture.
+    ///
+    /// # Errors
+    /// Those of the device, and [`crate::Error::Interrupted`].
+    pub fn bake_textures(&self, planned: &[PlannedTexture], control: &mut dyn Control) -> Result<Vec<BakedMap>> {
+        let mut maps = Vec::new();
+        let groups = planned.iter().map(|t| t.surfaces.iter().map(|s| s.mesh).collect()).collect::<Vec<Vec<usize>>>();
+        let share = u64::from(self.settings.spp) << 20;
+        self.with_each(&groups, share, control, |scene, tracer, origin, nth, control| {
+            let traced = Traced { scene, tracer, origin, cage: self.detailed.map(|(_, cage)| cage) };
+            maps.push(map::bake(self.scene, traced, &planned[nth], self.settings, control)?);
+            Ok(())
+        })?;
+        Ok(maps)
+    }
+
+    /// Bakes the vertices of each mesh that has a primitive in the file; also the number of rays.
+    ///
+    /// # Errors
+    /// Those of the device, of the file, and [`crate::Error::Interrupted`].
+    pub fn bake_vertices(&self, file: &SourceFile, control: &mut dyn Control) -> Result<(Vec<BakedVertices>, u64)> {
+        let (mut baked, mut rays) = (Vec::new(), 0);
+        let materials = &self.settings.materials;
+        let named = |meshes: &Vec<usize>| {
+            let name = &self.scene.materials[self.scene.meshes[meshes[0]].material].name;
+            materials.is_empty() || materials.contains(name)
+        };
+        let groups: Vec<Vec<usize>> =
+            meshes_by_material(self.scene).into_iter().map(|(_, meshes)| meshes).filter(named).collect();
+        let share = u64::from(self.settings.spp) << 16;
+        self.with_each(&groups, share, control, |scene, tracer, _, nth, control| {
+            for &mesh in &groups[nth] {
+                if let Some((vertices, traced)) = vertices::bake(scene, tracer, file, mesh, self.settings, control)? {
+                    baked.push(vertices);
+                    rays += traced;
+                }
+            }
+            Ok(())
+        })?;
+        Ok((baked, rays))
+    }
+
+    /// Calls `bake` for each group of meshes with the scene that occludes it, its tracer and
+    /// origin. `rays`: about how many each will trace.
+    fn with_each(
+        &self,
+        groups: &[Vec<usize>],
+        rays: u64,
+        control: &mut dyn Control,
+        mut bake: impl FnMut(&Scene, &Tracer, DVec3, usize, &mut dyn Control) -> Result<()>,
+    ) -> Result<()> {
+        let total = groups.len() as u64;
+        let mut run = |scene: &Scene, numbers: std::ops::Range<usize>, control: &mut dyn Control| {
+            let flat = FlatScene::new(scene);
+            let needs =
+                Needs { normals: self.settings.occlusion.hemisphere == Hemisphere::Shading, ..Needs::default() };
+            let (kind, _, compute) = self.tracing.choose(&self.device.info)?;
+            let build = self.tracing.build_options(rays * numbers.len() as u64);
+            let tracer = Tracer::with_build(self.device, kind, &flat, needs, compute, &build)?;
+            build.take_warnings().iter().for_each(|w| control.warning(w));
+            for number in numbers {
+                let mut part = Part { control: &mut *control, done: number as u64, total };
+                bake(scene, &tracer, flat.origin, number, &mut part)?;
+            }
+            Ok(())
+        };
+        match self.settings.occluders {
+            Occluders::Scene => run(&self.occluders(None), 0..groups.len(), control),
+            Occluders::Material => (0..groups.len())
+                .try_for_each(|number| run(&self.occluders(Some(&groups[number])), number..number + 1, control)),
+        }
+    }
+
+    /// The scene that occludes: all of it, or these meshes alone, and the ground.
+    fn occluders(&self, meshes: Option<&[usize]>) -> Cow<'_, Scene> {
+        let mut scene = Cow::Borrowed(self.detailed.map_or(self.scene, |(detailed, _)| detailed));
+        if let Some(meshes) = meshes {
+            // what is hidden keeps its number
+            let others = self.scene.instances.iter().enumerate().filter(|(_, i)| !meshes.contains(&i.mesh));
+            let hidden: Vec<usize> = others.map(|(i, _)| i).collect();
+            if !hidden.is_empty() {
+                scene.to_mut().hidden.extend(hidden);
+            }
+        }
+        if let Some((low, high)) = self.settings.has_ground.then(|| scene.bounds()).flatten() {
+            let centre = 0.5 * (low + high);
+            let floor = shapes::floor(DVec3::new(centre.x, low.y, centre.z), GROUND * (high - low).length());
+            let scene = scene.to_mut();
+            scene.instances.push(Instance {
+                name: "ground".to_owned(),
+                mesh: scene.meshes.len(),
+                object_to_world: glam::DAffine3::IDENTITY,
+            });
+            scene.meshes.push(Mesh { name: "ground".to_owned(), geometry: floor, material: 0, source: None });
+        }
+        scene
+    }
+}
+
+/// A part of a longer work.
+struct Part<'c> {
+    control: &'c mut dyn Control,
+    /// Parts before it, and all.
+    done: u64,
+    total: u64,
+}
+
+impl Control for Part<'_> {
+    fn progress(&mut self, done: u64, total: u64) {
+        self.control.progress(self.done * total + done, self.total * total);
+    }
+
+    fn warning(&mut self, text: &str) {
+        self.control.warning(text);
+    }
+
+    fn should_stop(&mut self) -> Result<bool> {
+        self.control.should_stop()
+    }
+}

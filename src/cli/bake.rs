@@ -1,0 +1,459 @@
+//! `skylit bake`: ambient occlusion and other properties of surfaces, as textures of a model or
+//! colours of its vertices.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueHint};
+use serde_json::json;
+
+use super::args::LoadArgs;
+use crate::bake::document::TextureImages;
+use crate::bake::map::BakedMap;
+use crate::bake::picture::{self, Bits};
+use crate::bake::plan::{PlannedTexture, plan};
+use crate::bake::session::BakeSession;
+use crate::bake::{BakeSettings, Map, Occluders, Space, Target, TexcoordChoice, agreement, document, pack};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::files::plan::FilePlan;
+use crate::integrators::ao::{Hemisphere, Occlusion};
+use crate::renderer::{RenderSettings, Renderer};
+use crate::scene::export::{AmendedFile, export_gltf};
+use crate::scene::load::{LoadOptions, load_with};
+use crate::scene::{Scene, SceneSettings};
+use crate::settings::Length;
+use crate::settings::parse::parse_falloff;
+use crate::terminal::console::Verbosity;
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::Warnings;
+use crate::tracer::DeviceSettings;
+
+const EXAMPLES: &str = "Examples:
+  skylit bake model.glb -o model-ao.glb                        an occlusion texture for each material, all else kept
+  skylit bake model.glb -o model-vc.glb --to vertices          colours of vertices instead
+  skylit bake model.glb -o bent.png --map bent-normal --space tangent --size 2048
+  skylit bake low.glb -o normals.png --from high.glb --map normal --space tangent
+  skylit bake model.obj -o thickness.exr --map thickness --ao-radius 10%";
+
+/// Largest width and height of a texture.
+const MAX_SIZE: u32 = 16384;
+
+/// `skylit bake`.
+#[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
+pub struct BakeArgs {
+    /// Model (.gltf, .glb, .obj, .brhan) or builtin:NAME
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// File to write: the model with the results in it (.glb, .gltf), or an image of a map (.png, .exr)
+    #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub output: PathBuf,
+    /// Property of the surfaces
+    #[arg(long, value_enum, default_value = "ao")]
+    pub map: Map,
+    /// Where the results go in a model
+    #[arg(long, value_enum, default_value = "texture")]
+    pub to: Target,
+    /// Width and height of textures in texels, WIDTHxHEIGHT or one number
+    #[arg(long, value_name = "SIZE", default_value = "1024", value_parser = parse_size)]
+    pub size: [u32; 2],
+    /// Samples per texel, or per corner of a triangle with --to vertices
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub spp: u32,
+    /// More samples for texels whose standard error is larger, 64 times --spp at most
+    #[arg(long, value_name = "ERROR", value_parser = parse_error)]
+    pub target_error: Option<f64>,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// Radius: hits beyond do not occlude; of thickness and curvature the length of rays [default: that of `render`; 10% for thickness, 1% for curvature]
+    #[arg(long, value_name = "R|PERCENT%|auto", value_parser = str::parse::<Length>)]
+    pub ao_radius: Option<Length>,
+    /// Falloff: a hit at distance d occludes by C^-d; 1 is binary [default: 1]
+    #[arg(long, value_name = "C", value_parser = parse_falloff)]
+    pub ao_falloff: Option<f64>,
+    /// Normal of the hemisphere
+    #[arg(long, value_enum, default_value = "geometric")]
+    pub ao_normal: Hemisphere,
+    /// What occludes a surface
+    #[arg(long, value_enum, default_value = "scene")]
+    pub occluders: Occluders,
+    /// Detailed model whose surfaces are baked onto this one (high to low): maps show what lies within --cage of a texel along its normal
+    #[arg(long, value_name = "MODEL", value_hint = ValueHint::FilePath)]
+    pub from: Option<String>,
+    /// Distance from the surface within which those of --from are looked for, on both sides [default: 2%]
+    #[arg(long, value_name = "D|PERCENT%", value_parser = str::parse::<Length>, requires = "from")]
+    pub cage: Option<Length>,
+    /// A ground plane under the scene occludes, too
+    #[arg(long)]
+    pub ground: bool,
+    /// Texture coordinates: the number of a set, `unwrap` for new ones, or `auto`, which takes set 1 or 0 if no two places share a texel, else new ones
+    #[arg(long, value_name = "auto|N|unwrap", default_value = "auto", value_parser = str::parse::<TexcoordChoice>)]
+    pub texcoord: TexcoordChoice,
+    /// Texels around charts that get the value of the nearest covered texel [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=16384))]
+    pub padding: Option<u32>,
+    /// Filter noise in the texture, not across edges or charts (biased)
+    #[arg(long)]
+    pub denoise: bool,
+    /// Coordinates of directions and positions
+    #[arg(long, value_enum, default_value = "world")]
+    pub space: Space,
+    /// Average over all instances of a mesh, not the first alone
+    #[arg(long)]
+    pub average_instances: bool,
+    /// Bake this material alone; may be given several times [default: all]
+    #[arg(long, value_name = "NAME")]
+    pub material: Vec<String>,
+    /// Bits of a channel of PNG files and of textures in a model
+    #[arg(long, value_name = "8|16", default_value = "8", value_parser = parse_bits)]
+    pub bits: Bits,
+    /// Pack occlusion, roughness and metalness into one texture, where a material has them by the same coordinates
+    #[arg(long, value_name = "orm", value_parser = ["orm"])]
+    pub pack: Option<String>,
+    /// Render the written model with its baked and with traced ambient occlusion, and report how far apart they are
+    #[arg(long)]
+    pub verify: bool,
+    /// Files of the scene
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Meaning of the file
+    #[command(flatten)]
+    pub meaning: SceneSettings,
+    /// Device and tracer
+    #[command(flatten)]
+    pub device: DeviceSettings,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').unwrap_or((text, text));
+    let side = |t: &str| t.trim().parse().ok().filter(|n| (1..=MAX_SIZE).contains(n));
+    let size = side(width).zip(side(height)).map(|(w, h)| [w, h]);
+    size.ok_or_else(|| format!("expected texels, WIDTHxHEIGHT or one number from 1 to {MAX_SIZE}"))
+}
+
+fn parse_error(text: &str) -> Result<f64, String> {
+    let error = text.trim().parse().ok().filter(|e: &f64| *e > 0.0 && *e < 1.0);
+    error.ok_or_else(|| "expected a number between 0 and 1".to_owned())
+}
+
+fn parse_bits(text: &str) -> Result<Bits, String> {
+    match text {
+        "8" => Ok(Bits::Eight),
+        "16" => Ok(Bits::Sixteen),
+        _ => Err("expected 8 or 16".to_owned()),
+    }
+}
+
+/// What is written.
+#[derive(Clone, Copy, PartialEq)]
+enum Output {
+    /// A model with the results in it.
+    Model,
+    /// An image of each material's map.
+    Image,
+}
+
+/// Checks what can be known before the scene is read.
+fn check(args: &BakeArgs) -> Result<Output> {
+    args.device.check()?;
+    let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let output = match extension.as_str() {
+        "glb" | "gltf" => Output::Model,
+        "png" | "exr" => Output::Image,
+        _ => {
+            let path = args.output.display();
+            return Err(Error::Usage(format!(
+                "{path}: unknown format: the file name must end in .glb or .gltf for a model, .png or .exr for an image"
+            )));
+        }
+    };
+    let usage = |text: String| Err(Error::Usage(text));
+    match output {
+        Output::Model if args.map != Map::Ao => usage(format!(
+            "--map {}: a model holds ambient occlusion alone; write an image, .png or .exr",
+            args.map.name()
+        )),
+        Output::Image if args.to == Target::Vertices => {
+            usage("--to vertices: an image has no vertices; write a model, .glb or .gltf".to_owned())
+        }
+        _ if args.from.is_some() && (args.to == Target::Vertices || args.occluders != Occluders::Scene) => {
+            usage("--from is for textures, and what it names occludes".to_owned())
+        }
+        _ if matches!(args.cage, Some(Length::Auto)) => usage("--cage: a length or a share is expected".to_owned()),
+        _ if args.target_error.is_some() && (args.to == Target::Vertices || !args.map.is_sampled()) => {
+            usage("--target-error is for textures of what is sampled".to_owned())
+        }
+        _ if args.denoise && args.to == Target::Vertices => {
+            usage("--denoise is for textures: vertices are the means of their triangles".to_owned())
+        }
+        _ if args.pack.is_some() && (output == Output::Image || args.to == Target::Vertices) => {
+            usage("--pack orm is for textures of a model".to_owned())
+        }
+        _ if args.pack.is_some() && args.bits == Bits::Sixteen => {
+            usage("--pack orm: packed textures have 8 bits a channel".to_owned())
+        }
+        Output::Image if args.verify => {
+            usage("--verify renders the written model: write one, .glb or .gltf".to_owned())
+        }
+        _ if args.verify && args.to == Target::Vertices => {
+            usage("--verify is for textures: colours of vertices are not rendered apart".to_owned())
+        }
+        _ => Ok(output),
+    }
+}
+
+/// Bakes and writes.
+pub fn run(args: &BakeArgs) -> Result<()> {
+    let start = Instant::now();
+    let console = args.verbosity.console();
+    let output = check(args)?;
+    interrupt::install();
+    let mut files_plan = FilePlan::default();
+    files_plan.reads("the scene", &args.scene);
+    if let Some(from) = &args.from {
+        files_plan.reads("--from", from);
+    }
+    files_plan.writes("the output", &args.output);
+    files_plan.check()?;
+    files::check_writable(&args.output)?;
+
+    // the scene, and where results are written into it the file that has it
+    let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
+    let mut warnings = Warnings::new(console);
+    renderer.scene().report.all_warnings().iter().for_each(|w| warnings.add(w));
+    files_plan.check_scene(&renderer.scene().report.files)?;
+    let (settings, remarks) = settings(args, &mut renderer)?;
+    let device = renderer.device().clone();
+    let mut scene = renderer.into_scene();
+    let model = ModelFile::open(args, output, &mut scene)?;
+
+    // what is traced
+    let planned = match args.to {
+        Target::Texture => {
+            let mut control = ProgressControl { progress: Progress::new("unwrapping", &console), keep_partial: false };
+            plan(&scene, model.as_ref().map(|m| m.file.source()), &settings, &mut control)?
+        }
+        Target::Vertices => Vec::new(),
+    };
+    let paths = image_paths(args, output, &planned);
+    paths.iter().filter(|path| **path != args.output).for_each(|path| files_plan.writes("a map", path));
+    document::texture_companions(&args.output, &planned)
+        .iter()
+        .filter(|_| output == Output::Model)
+        .for_each(|path| files_plan.writes("a file beside the output", path));
+    files_plan.check()?;
+    files_plan.check_scene(&scene.report.files)?;
+    for line in remarks.iter().chain(planned.iter().flat_map(|t| &t.remarks)) {
+        console.line(line)?;
+    }
+    let unpacked = planned.iter().filter(|_| args.pack.is_some()).filter_map(|t| pack::partner(&scene, t).err());
+    unpacked.for_each(|reason| warnings.add(&reason));
+
+    // the maps, or the values of vertices
+    let detailed = args.from.as_ref().map(|from| args.load.load(from, &console)).transpose()?;
+    if let Some(detailed) = &detailed {
+        files_plan.check_scene(&detailed.report.files)?;
+        detailed.report.all_warnings().iter().for_each(|w| warnings.add(w));
+    }
+    let session = BakeSession {
+        scene: &scene,
+        device: &device,
+        tracing: &args.device,
+        settings: &settings,
+        detailed: detailed.as_ref().map(|detailed| (detailed, cage(args, &scene))),
+    };
+    let mut control = ProgressControl { progress: Progress::new("baking", &console), keep_partial: false };
+    let mut record = json!({
+        "scene": args.scene, "map": args.map.name(), "to": args.to.name(),
+        "ao_radius": settings.occlusion.radius, "spp": settings.spp,
+    });
+    let (written, what, rays) = match (args.to, model) {
+        (Target::Vertices, None) => return Err(Error::Usage("--to vertices needs a model".to_owned())),
+        (Target::Vertices, Some(model)) => {
+            let (baked, rays) = session.bake_vertices(model.file.source(), &mut control)?;
+            let count: usize = baked.iter().map(|b| b.values.len()).sum();
+            record["vertices"] = json!(count);
+            (document::save_vertices(model.file, &baked, &args.output)?, format!("{count} vertices"), rays)
+        }
+        (Target::Texture, model) => {
+            let maps = session.bake_textures(&planned, &mut control)?;
+            let rays = maps.iter().map(|m| m.rays).sum();
+            record["textures"] = planned.iter().zip(&maps).map(|(t, m)| texture_record(t, m)).collect();
+            let what = describe(&maps);
+            let baked = planned.into_iter().zip(maps).collect::<Vec<_>>();
+            let written = match model {
+                Some(model) => {
+                    let images = TextureImages { bits: args.bits, are_packed: args.pack.is_some() };
+                    document::save_textures(model.file, &scene, &baked, &settings, images, &args.output)?
+                }
+                None => {
+                    for ((_, map), path) in baked.iter().zip(&paths) {
+                        picture::save(map, &settings, args.bits, path)?;
+                    }
+                    paths
+                }
+            };
+            (written, what, rays)
+        }
+    };
+    drop(control);
+    device.check_validation()?;
+    device.save_pipeline_cache();
+
+    // the result
+    let seconds = start.elapsed().as_secs_f64();
+    let names: Vec<String> = written.iter().map(|p| p.display().to_string()).collect();
+    console.line(&format!("{}: {what}; {:.1} million rays, {seconds:.1} s", names.join(", "), rays as f64 / 1e6))?;
+    record["files"] = json!(files::lossy(&written));
+    record["rays"] = json!(rays);
+    record["seconds"] = json!(seconds);
+    if args.verify {
+        let mut control = ProgressControl { progress: Progress::new("comparing", &console), keep_partial: false };
+        let found = agreement::measure(&args.output, &args.device, &settings, &mut control)?;
+        console.line(&format!(
+            "baked against traced ambient visibility over {} pixels: RMSE {:.4}, mean difference {:+.4}",
+            found.pixels, found.rmse, found.bias
+        ))?;
+        record["verify"] = json!({ "pixels": found.pixels, "rmse": found.rmse, "bias": found.bias });
+    }
+    record["warnings"] = json!(warnings.list);
+    console.record(&record)
+}
+
+/// The file that a model is written into.
+struct ModelFile {
+    file: AmendedFile,
+    /// A scene of another format, as a glTF file.
+    _folder: Option<tempfile::TempDir>,
+}
+
+impl ModelFile {
+    /// Opens the file of the scene; `None` if an image is written. A scene that is no glTF file
+    /// becomes one, which is loaded in its place.
+    fn open(args: &BakeArgs, output: Output, scene: &mut Scene) -> Result<Option<Self>> {
+        if output == Output::Image {
+            return Ok(None);
+        }
+        let path = Path::new(&args.scene);
+        if ["gltf", "glb"].iter().any(|extension| files::has_extension(path, extension)) {
+            return Ok(Some(Self { file: AmendedFile::open(path)?, _folder: None }));
+        }
+        if !files::has_extension(&args.output, "glb") {
+            let output = args.output.display();
+            return Err(Error::Usage(format!(
+                "{output}: a model that is no glTF file becomes a .glb: choose that name"
+            )));
+        }
+        let folder = tempfile::tempdir().map_err(|e| Error::Output {
+            path: std::env::temp_dir(),
+            message: format!("no folder can be made for the model: {e}"),
+        })?;
+        let path = folder.path().join("model.glb");
+        export_gltf(scene, &path)?;
+        let (name, report) = (scene.name.clone(), scene.report.clone());
+        *scene = load_with(&path.to_string_lossy(), &LoadOptions::default())?;
+        (scene.name, scene.report) = (name, report);
+        Ok(Some(Self { file: AmendedFile::open(&path)?, _folder: Some(folder) }))
+    }
+}
+
+/// The settings of baking, with a radius in scene units, and sentences on what was chosen.
+fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>)> {
+    let bounds = renderer.scene().bounds();
+    let diagonal = bounds.map_or(1.0, |(low, high)| (high - low).length());
+    let mut remarks = Vec::new();
+
+    // the radius of ambient occlusion is chosen as that of a render
+    let own = args.map.default_radius().map(Length::OfDiagonal);
+    let wanted = args.ao_radius.or(own);
+    let radius = match wanted.and_then(|length| length.units(diagonal)) {
+        Some(units) => units,
+        None => {
+            let mut settings = RenderSettings { scene: args.meaning.clone(), ..RenderSettings::default() };
+            settings.integrators.ao.ao_radius = wanted;
+            let completed = renderer.complete(&settings, None)?;
+            remarks.extend(completed.choices.into_iter().filter(|line| line.starts_with("AO radius")));
+            completed.settings.integrators.ao.radius()
+        }
+    };
+    if own.is_some() && !radius.is_finite() {
+        return Err(Error::Usage(format!("--ao-radius {radius}: --map {} needs a length, as 10%", args.map.name())));
+    }
+    let settings = BakeSettings {
+        map: args.map,
+        size: args.size,
+        spp: args.spp,
+        target_error: args.target_error,
+        seed: args.seed,
+        occlusion: Occlusion { radius, falloff: args.ao_falloff.unwrap_or(1.0), hemisphere: args.ao_normal },
+        occluders: args.occluders,
+        has_ground: args.ground,
+        texcoords: args.texcoord,
+        padding: args.padding.map_or(f64::INFINITY, f64::from),
+        is_smoothed: args.denoise,
+        space: args.space,
+        averages_instances: args.average_instances,
+        materials: args.material.clone(),
+    };
+    if renderer.scene().rig.is_some() {
+        remarks.push("the scene is animated: its rest pose is baked".to_owned());
+    }
+    Ok((settings, remarks))
+}
+
+/// The distance from surfaces within which those of a detailed model are looked for, scene units.
+fn cage(args: &BakeArgs, scene: &Scene) -> f64 {
+    let diagonal = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
+    args.cage.and_then(|length| length.units(diagonal)).unwrap_or(0.02 * diagonal)
+}
+
+/// The images that are written: one of the output's name, or with several textures one a material.
+fn image_paths(args: &BakeArgs, output: Output, planned: &[PlannedTexture]) -> Vec<PathBuf> {
+    if output == Output::Model {
+        return Vec::new();
+    }
+    if planned.len() == 1 {
+        return vec![args.output.clone()];
+    }
+    let stem = args.output.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = args.output.extension().unwrap_or_default().to_string_lossy();
+    let path = |texture: &PlannedTexture| {
+        args.output.with_file_name(format!("{stem}-{}.{extension}", files::portable_name(&texture.name)))
+    };
+    planned.iter().map(path).collect()
+}
+
+/// What was baked, in words.
+fn describe(maps: &[BakedMap]) -> String {
+    let sizes: std::collections::BTreeSet<String> =
+        maps.iter().map(|m| format!("{}x{}", m.size[0], m.size[1])).collect();
+    let sizes = sizes.into_iter().collect::<Vec<_>>().join(" and ");
+    let count = if maps.len() == 1 { "1 texture".to_owned() } else { format!("{} textures", maps.len()) };
+    let hidden: usize = maps.iter().map(|m| m.hidden).sum();
+    let hidden = if hidden > 0 { format!(", {hidden} texels inside of other geometry filled") } else { String::new() };
+    let error = maps.iter().map(|m| m.error).fold(0.0, f64::max);
+    let error = if error > 0.0 { format!(", standard error at most {error:.4}") } else { String::new() };
+    format!("{count} of {sizes}{error}{hidden}")
+}
+
+/// A texture in the JSON record.
+fn texture_record(texture: &PlannedTexture, map: &BakedMap) -> serde_json::Value {
+    let covered = map.covered.iter().filter(|c| **c).count();
+    json!({
+        "material": texture.name,
+        "size": map.size,
+        "texcoord": texture.texcoord,
+        "unwrapped": !texture.unwrapped.is_empty(),
+        "covered": covered as f64 / map.covered.len().max(1) as f64,
+        "hidden_texels": map.hidden,
+        "standard_error": map.error,
+        "bounds": [map.bounds.0.to_array(), map.bounds.1.to_array()],
+        "rays": map.rays,
+    })
+}

@@ -1,0 +1,300 @@
+//! Baked maps against closed forms, and what is filled.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec2, Vec3};
+use skylit::bake::map::BakedMap;
+use skylit::bake::plan::{PlannedTexture, plan};
+use skylit::bake::session::BakeSession;
+use skylit::bake::texels::{Layout, TexelPoint};
+use skylit::bake::{BakeSettings, Map, Occluders, Space};
+use skylit::film::NoControl;
+use skylit::gpu::Device;
+use skylit::integrators::ao::Occlusion;
+use skylit::oracle::closed_form as exact;
+use skylit::scene::builtin::shapes;
+use skylit::scene::{Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh};
+use skylit::tracer::{DeviceSettings, TracerChoice, TracerKind};
+
+use crate::common::{assert_validation_clean, device, picked};
+
+/// A rectangle with texture coordinates from (0, 0) at its first corner, which is `centre - u - v`.
+fn rectangle(centre: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
+    TriangleMesh {
+        positions: vec![centre - u - v, centre + u - v, centre + u + v, centre - u + v],
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+        texcoords: [vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y], Vec::new()],
+        ..TriangleMesh::default()
+    }
+}
+
+/// A scene of meshes, each with a material of its own, whose names are their numbers.
+fn scene_of(meshes: Vec<Geometry>) -> Scene {
+    let mut scene = Scene::default();
+    for (k, geometry) in meshes.into_iter().enumerate() {
+        scene.materials.push(Material { name: k.to_string(), ..Material::default() });
+        scene.instances.push(Instance { name: String::new(), mesh: k, object_to_world: DAffine3::IDENTITY });
+        scene.meshes.push(Mesh { name: k.to_string(), geometry, material: k, source: None });
+    }
+    scene
+}
+
+fn tracing(kind: TracerKind) -> DeviceSettings {
+    let tracer = match kind {
+        TracerKind::Pipeline => TracerChoice::Pipeline,
+        TracerKind::Query => TracerChoice::Query,
+        TracerKind::Compute => TracerChoice::Compute,
+    };
+    DeviceSettings { tracer: Some(tracer), ..DeviceSettings::default() }
+}
+
+/// The map of the first material.
+fn bake(device: &Arc<Device>, kind: TracerKind, scene: &Scene, settings: BakeSettings) -> (PlannedTexture, BakedMap) {
+    let settings = BakeSettings { materials: vec!["0".to_owned()], ..settings };
+    let mut planned = plan(scene, None, &settings, &mut NoControl).unwrap();
+    let session = BakeSession { scene, device, tracing: &tracing(kind), settings: &settings, detailed: None };
+    let mut maps = session.bake_textures(&planned, &mut NoControl).unwrap();
+    assert_eq!(maps.len(), 1);
+    (planned.remove(0), maps.remove(0))
+}
+
+fn settings(size: u32, spp: u32) -> BakeSettings {
+    BakeSettings { size: [size; 2], spp, ..BakeSettings::default() }
+}
+
+/// Mean and root mean square difference of a map's first channel from what is expected at texels' centres, in units of the texture.
+fn differences(map: &BakedMap, expected: impl Fn(Vec2) -> f64) -> [f64; 2] {
+    let [width, height] = map.size;
+    let mut sums = [0.0; 2];
+    for (k, value) in map.values.iter().enumerate() {
+        let at = Vec2::new((k as u32 % width) as f32 + 0.5, (k as u32 / width) as f32 + 0.5);
+        let difference = f64::from(value.x) - expected(at / Vec2::new(width as f32, height as f32));
+        sums[0] += difference;
+        sums[1] += difference * difference;
+    }
+    let n = map.values.len() as f64;
+    [sums[0] / n, (sums[1] / n).sqrt()]
+}
+
+#[test]
+fn gpu_bake_a_plane_below_a_sphere() {
+    let device = device();
+    let floor = rectangle(Vec3::ZERO, Vec3::X * 3.0, Vec3::NEG_Z * 3.0);
+    let sphere = Sphere { center: Vec3::new(0.0, 1.25, 0.0), radius: 1.0 };
+    let scene = scene_of(vec![Geometry::Triangles(floor), Geometry::Spheres(vec![sphere])]);
+    let sphere_at = |uv: Vec2| {
+        let rho = ((uv - 0.5) * 6.0).length();
+        exact::sphere_over_plane(1.0, 1.25, rho.into()).unwrap()
+    };
+    for kind in picked(&device) {
+        let (texture, map) = bake(&device, kind, &scene, settings(48, 256));
+        assert_eq!((texture.texcoord, map.hidden), (0, 0));
+        assert!(map.covered.iter().all(|c| *c));
+        let [bias, rmse] = differences(&map, sphere_at);
+        println!("{kind}: bias {bias:+.1e}, rmse {rmse:.1e}, estimated {:.1e}", map.error);
+        assert!(bias.abs() < 5e-4 && rmse < 0.012, "{kind}: {bias} {rmse}");
+        // independent samples would have the estimated error, these have less
+        assert!(rmse < map.error && map.error < 0.05, "{kind}: {}", map.error);
+
+        // as many samples as an error takes, and a filter of what is left
+        let few = settings(48, 16);
+        let target = BakeSettings { target_error: Some(0.02), ..few.clone() };
+        let (_, target) = bake(&device, kind, &scene, target);
+        let (_, plain) = bake(&device, kind, &scene, few.clone());
+        let (_, smooth) = bake(&device, kind, &scene, BakeSettings { is_smoothed: true, ..few });
+        let error = |map: &BakedMap| differences(map, sphere_at)[1];
+        assert!(target.rays > 2 * plain.rays && target.rays < 64 * plain.rays, "{kind}: {}", target.rays);
+        assert!(error(&target) < 0.02, "{kind}: {}", error(&target));
+        assert!(error(&smooth) < 0.6 * error(&plain), "{kind}: {} {}", error(&smooth), error(&plain));
+    }
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_bake_a_groove() {
+    // a small floor at a wall so large that its ends are not seen
+    let device = device();
+    let floor = rectangle(Vec3::X, Vec3::X, Vec3::NEG_Z);
+    let wall = rectangle(Vec3::Y * 1e3, Vec3::Y * 1e3, Vec3::Z * 1e3);
+    let scene = scene_of(vec![Geometry::Triangles(floor), Geometry::Triangles(wall)]);
+    for kind in picked(&device) {
+        // every texel sees a groove
+        let (_, map) = bake(&device, kind, &scene, settings(16, 1024));
+        let [bias, rmse] = differences(&map, |_| exact::v_groove(std::f64::consts::FRAC_PI_2));
+        assert!(bias.abs() < 1e-3 && rmse < 0.01, "{kind}: {bias} {rmse}");
+
+        // directions lean away from the wall: half of the mean open direction of a quarter of the sphere
+        let (_, bent) = bake(&device, kind, &scene, BakeSettings { map: Map::BentNormal, ..settings(16, 1024) });
+        let tangent = BakeSettings { map: Map::BentNormal, space: Space::Tangent, ..settings(16, 1024) };
+        let (_, tangent) = bake(&device, kind, &scene, tangent);
+        for (world, own) in bent.values.iter().zip(&tangent.values) {
+            assert!((world.length() - 1.0).abs() < 1e-4 && world.z.abs() < 0.05, "{kind}: {world}");
+            // means of cosine-weighted directions with x > 0: x = 2/3 * 2/pi, y = 2/3
+            let slope = world.x / world.y;
+            assert!((slope - std::f32::consts::FRAC_2_PI).abs() < 0.05, "{kind}: {world}");
+            // u grows along x; v grows against z, and the bitangent points where it falls, as normal maps have it
+            assert!((*own - Vec3::new(world.x, world.z, world.y)).length() < 1e-3, "{kind}: {own} {world}");
+        }
+    }
+}
+
+#[test]
+fn gpu_bake_thickness_and_curvature_of_a_slab() {
+    // two faces that look away from each other, far wider than they are thick
+    let device = device();
+    let (thick, radius) = (1.0f32, 4.0f64);
+    let top = rectangle(Vec3::ZERO, Vec3::X * 100.0, Vec3::NEG_Z * 100.0);
+    let bottom = rectangle(Vec3::new(0.0, -thick, 0.0), Vec3::X * 100.0, Vec3::Z * 100.0);
+    let scene = scene_of(vec![Geometry::Triangles(top), Geometry::Triangles(bottom)]);
+    for kind in picked(&device) {
+        let map = |map, radius| {
+            let settings = BakeSettings { map, occlusion: Occlusion::new(radius, 1.0), ..settings(8, 1024) };
+            bake(&device, kind, &scene, settings).1
+        };
+        // the integral of min(t / cos, r) / r over the cosine-weighted hemisphere
+        let share = f64::from(thick) / radius;
+        let middle = f64::from(map(Map::Thickness, radius).values[4 * 8 + 4].x);
+        assert!((middle - (2.0 * share - share * share)).abs() < 2e-3, "{kind}: {middle}");
+        // nothing within the radius on either side: flat; and open above alone: an edge
+        assert_eq!(map(Map::Curvature, 0.5).values[4 * 8 + 4].x, 0.5);
+        assert!(map(Map::Curvature, radius).values[4 * 8 + 4].x > 0.9);
+    }
+}
+
+#[test]
+fn gpu_bake_fills_what_is_inside_of_others() {
+    let device = device();
+    let floor = rectangle(Vec3::ZERO, Vec3::X * 2.0, Vec3::NEG_Z * 2.0);
+    let cube = shapes::cuboid(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1.0));
+    let scene = scene_of(vec![Geometry::Triangles(floor), cube]);
+    for kind in picked(&device) {
+        let (_, map) = bake(&device, kind, &scene, settings(32, 64));
+        // a quarter of the floor lies within the cube
+        assert_eq!(map.hidden, 16 * 16, "{kind}");
+        assert!(map.values.iter().all(|v| v.x > 0.2), "{kind}: filled from outside");
+
+        // by itself nothing occludes it, and on the ground nothing changes above it
+        let alone = BakeSettings { occluders: Occluders::Material, ..settings(32, 64) };
+        for has_ground in [false, true] {
+            let (_, map) = bake(&device, kind, &scene, BakeSettings { has_ground, ..alone.clone() });
+            assert!(map.values.iter().all(|v| v.x == 1.0) && map.hidden == 0, "{kind}");
+        }
+    }
+}
+
+#[test]
+fn gpu_bake_the_ground_occludes() {
+    let device = device();
+    // a ceiling that looks down upon it, and what makes it the ground of a higher scene
+    let ceiling = rectangle(Vec3::ZERO, Vec3::X, Vec3::Z);
+    let below = rectangle(Vec3::new(0.0, -1.0, 0.0), Vec3::X * 1e-3, Vec3::Z * 1e-3);
+    let scene = scene_of(vec![Geometry::Triangles(ceiling), Geometry::Triangles(below)]);
+    for kind in picked(&device) {
+        let value =
+            |has_ground| bake(&device, kind, &scene, BakeSettings { has_ground, ..settings(4, 64) }).1.values[5].x;
+        assert!(value(false) > 0.99 && value(true) < 0.01, "{kind}: {} {}", value(false), value(true));
+    }
+}
+
+/// Instances share a texture: that of the first, or the mean.
+#[test]
+fn gpu_bake_instances() {
+    let device = device();
+    let floor = rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    // it looks down: its back would have the floor within it
+    let lid = rectangle(Vec3::new(0.0, 0.01, 0.0), Vec3::X * 9.0, Vec3::Z * 9.0);
+    let mut scene = scene_of(vec![Geometry::Triangles(floor), Geometry::Triangles(lid)]);
+    let far = DAffine3::from_translation(DVec3::X * 100.0);
+    scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: far });
+    for kind in picked(&device) {
+        let value = |averages_instances| {
+            bake(&device, kind, &scene, BakeSettings { averages_instances, ..settings(4, 256) }).1.values[5].x
+        };
+        assert!(value(false) < 0.01, "{kind}: {}", value(false));
+        assert!((value(true) - 0.5).abs() < 0.01, "{kind}: {}", value(true));
+    }
+}
+
+#[test]
+fn positions_and_normals_are_those_of_the_surface() {
+    let device = device();
+    let floor = rectangle(Vec3::new(1.0, 0.0, 0.0), Vec3::X * 2.0, Vec3::NEG_Z);
+    let mut scene = scene_of(vec![Geometry::Triangles(floor)]);
+    scene.instances[0].object_to_world = DAffine3::from_rotation_z(-std::f64::consts::FRAC_PI_2);
+    let kind = picked(&device)[0];
+    let value = |map, space| {
+        let (texture, map) = bake(&device, kind, &scene, BakeSettings { map, space, ..settings(16, 4) });
+        let layout = Layout::new(texture.size, &[&texture.surfaces[0].corners]);
+        let points: Vec<TexelPoint> = layout.points(0..1).remove(0).points;
+        assert_eq!(points.len(), 16 * 16 * 4);
+        map.values[0]
+    };
+    let corner = value(Map::Position, Space::Object);
+    assert!((corner - Vec3::new(-1.0 + 2.0 / 16.0, 0.0, 1.0 - 1.0 / 16.0)).length() < 0.1, "{corner}");
+    let world = value(Map::Position, Space::World);
+    assert!((world - Vec3::new(corner.y, -corner.x, corner.z)).length() < 1e-4, "{world}");
+    assert!((value(Map::Normal, Space::World) - Vec3::X).length() < 1e-6);
+    assert!((value(Map::Normal, Space::Object) - Vec3::Y).length() < 1e-6);
+    assert_eq!(value(Map::Normal, Space::Tangent), Vec3::Z);
+}
+
+/// What is not unique is said, and no image is made of it.
+#[test]
+fn coordinates_that_overlap_are_refused() {
+    let plane = |x: f32| rectangle(Vec3::X * x, Vec3::X, Vec3::NEG_Z);
+    let mut scene = scene_of(vec![Geometry::Triangles(plane(0.0)), Geometry::Triangles(plane(5.0))]);
+    scene.meshes[1].material = 0;
+    let refused = |scene: &Scene| match plan(scene, None, &settings(64, 1), &mut NoControl) {
+        Err(e) => e.to_string(),
+        Ok(_) => panic!("accepted"),
+    };
+    let text = refused(&scene);
+    assert!(text.contains("overlap: 100.0 % of the texels") && text.contains("-o NAME.glb"), "{text}");
+    let change = |change: fn(&mut Vec2)| {
+        let mut scene = scene_of(vec![Geometry::Triangles(plane(0.0))]);
+        let Geometry::Triangles(triangles) = &mut scene.meshes[0].geometry else { unreachable!() };
+        triangles.texcoords[0].iter_mut().for_each(change);
+        refused(&scene)
+    };
+    assert!(change(|uv| *uv *= 3.0).contains("repeat the texture on 100 % of the surface"));
+    assert!(change(|uv| *uv = Vec2::ZERO).contains("show no texels on 100 % of the surface"));
+}
+
+/// A flat card that looks at a bumpy model takes its normals and its occlusion.
+#[test]
+fn gpu_bake_from_a_detailed_model() {
+    let device = device();
+    let card = scene_of(vec![Geometry::Triangles(rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z))]);
+    // half of it lies on a slope of 45 degrees, the other half on nothing
+    let slope = Vec3::new(0.25, 0.25, 0.0);
+    let detailed = scene_of(vec![Geometry::Triangles(rectangle(Vec3::X * 0.5, slope * 2.0, Vec3::NEG_Z * 4.0))]);
+    for kind in picked(&device) {
+        for (map, space) in [(Map::Normal, Space::Tangent), (Map::Normal, Space::World), (Map::Position, Space::World)]
+        {
+            let settings = BakeSettings { map, space, padding: 0.0, ..settings(32, 4) };
+            let planned = plan(&card, None, &settings, &mut NoControl).unwrap();
+            let session = BakeSession {
+                scene: &card,
+                device: &device,
+                tracing: &tracing(kind),
+                settings: &settings,
+                detailed: Some((&detailed, 0.6)),
+            };
+            let map = session.bake_textures(&planned, &mut NoControl).unwrap().remove(0);
+            for (at, (value, covered)) in map.values.iter().zip(&map.covered).enumerate() {
+                let x = (at % 32) as f32 / 16.0 - 1.0 + 1.0 / 32.0;
+                // from the lower end of the slope, at x = 0, to where it leaves the cage
+                assert_eq!(*covered, x > 0.0, "{kind}: {x}");
+                if !*covered {
+                    continue;
+                }
+                let expected = match space {
+                    Space::Tangent => Vec3::new(-0.5f32.sqrt(), 0.0, 0.5f32.sqrt()),
+                    _ if settings.map == Map::Normal => Vec3::new(-0.5f32.sqrt(), 0.5f32.sqrt(), 0.0),
+                    _ => Vec3::new(x, x - 0.5, value.z),
+                };
+                assert!((*value - expected).length() < 0.02, "{kind}: {value} {expected}");
+            }
+        }
+    }
+}

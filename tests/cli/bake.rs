@@ -1,0 +1,219 @@
+//! `skylit bake`: what is added to a model, what stays, and what is refused.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use skylit::output;
+use skylit::scene::load::load;
+use skylit::scene::{Geometry, Scene};
+
+use crate::common::command::{device, fails, json, place, refuses, run, stderr};
+
+/// The JSON and the binary chunk of a `.glb`.
+fn chunks(path: &str) -> (String, Vec<u8>) {
+    let file = fs::read(path).unwrap();
+    let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&file[..4], word(8)), (&b"glTF"[..], file.len()), "{path}");
+    let end = 20 + word(12);
+    let bin = if end < file.len() { file[end + 8..][..word(end)].to_vec() } else { Vec::new() };
+    (String::from_utf8(file[20..end].to_vec()).unwrap(), bin)
+}
+
+fn document(path: &str) -> Value {
+    serde_json::from_str(&chunks(path).0).unwrap()
+}
+
+fn bakes(args: &[&str]) -> Value {
+    let out = run(&[&["bake", "--json"], args].concat());
+    assert!(out.status.success(), "{}", stderr(&out));
+    json(&out)
+}
+
+/// A `.gltf` of two triangles that share their texture coordinates, with what no tool of ours knows, and its buffer beside it.
+fn folded(folder: &Path) -> String {
+    let positions: [[f32; 3]; 6] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]];
+    let texcoords: [[f32; 2]; 6] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]];
+    let ids: [u16; 6] = [7, 8, 9, 10, 11, 12];
+    let mut bytes: Vec<u8> = Vec::new();
+    bytes.extend(positions.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(texcoords.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(ids.iter().flat_map(|x| x.to_le_bytes()));
+    fs::write(folder.join("folded data.bin"), &bytes).unwrap();
+    let text = r#"{ "asset":{"version":"2.0", "generator":"a person"}, "scene":0, "scenes":[{"nodes":[0]}],
+  "nodes":[{"mesh":0, "name":"fold", "extras":{"weight":1.50, "tags":[ 1,2 ]}}],
+  "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1,"_ID":2}, "material":0, "extras":{"x":1e+2}}]}],
+  "materials":[{"name":"paper", "extras":{"of":"someone"}, "pbrMetallicRoughness":{"roughnessFactor":0.500}}],
+  "accessors":[
+    {"bufferView":0,"componentType":5126,"count":6,"type":"VEC3","min":[0,0,-1],"max":[1,1,0]},
+    {"bufferView":1,"componentType":5126,"count":6,"type":"VEC2"},
+    {"bufferView":2,"componentType":5123,"count":6,"type":"SCALAR"}],
+  "bufferViews":[
+    {"buffer":0,"byteLength":72}, {"buffer":0,"byteOffset":72,"byteLength":48}, {"buffer":0,"byteOffset":120,"byteLength":12}],
+  "buffers":[{"uri":"folded%20data.bin","byteLength":132}], "somethingElse":{"kept":[true]} }"#;
+    let path = folder.join("folded.gltf");
+    fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn triangles(scene: &Scene) -> &skylit::scene::TriangleMesh {
+    let Geometry::Triangles(triangles) = &scene.meshes[0].geometry else { panic!("no triangles") };
+    triangles
+}
+
+#[test]
+fn a_model_gets_coordinates_and_a_texture_and_keeps_the_rest() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = folded(dir.path());
+    let glb = place(&dir, "baked.glb");
+    let record = bakes(&[&model, "-o", &glb, "--size", "64", "--spp", "16"]);
+    let texture = &record["textures"][0];
+    assert_eq!(
+        (&texture["material"], &texture["unwrapped"], &texture["texcoord"]),
+        (&"paper".into(), &true.into(), &1.into())
+    );
+
+    // the text of what nothing changes is that of the file
+    let (text, bin) = chunks(&glb);
+    for kept in [
+        r#""asset":{"version":"2.0", "generator":"a person"}"#,
+        r#""extras":{"weight":1.50, "tags":[ 1,2 ]}"#,
+        r#""extras":{"x":1e+2}"#,
+        r#""extras":{"of":"someone"}"#,
+        r#""pbrMetallicRoughness":{"roughnessFactor":0.500}"#,
+        r#""somethingElse":{"kept":[true]}"#,
+        r#"{"bufferView":2,"componentType":5123,"count":6,"type":"SCALAR"}"#,
+    ] {
+        assert!(text.contains(kept), "{kept}\n{text}");
+    }
+    let original = fs::read(dir.path().join("folded data.bin")).unwrap();
+    assert_eq!(&bin[..original.len()], &original[..]);
+
+    // the texture, by the new set of coordinates
+    let document = document(&glb);
+    let occlusion = &document["materials"][0]["occlusionTexture"];
+    assert_eq!(occlusion["texCoord"], 1);
+    let source = document["textures"][occlusion["index"].as_u64().unwrap() as usize]["source"].as_u64().unwrap();
+    assert_eq!(document["images"][source as usize]["mimeType"], "image/png");
+    let attributes = document["meshes"][0]["primitives"][0]["attributes"].as_object().unwrap();
+    assert_eq!(attributes.keys().collect::<Vec<_>>(), ["POSITION", "TEXCOORD_0", "TEXCOORD_1", "_ID"]);
+
+    // vertices are copies: the same triangles, with unique coordinates, and ids that go with positions
+    let (before, after) = (load(&model).unwrap(), load(&glb).unwrap());
+    let (old, new) = (triangles(&before), triangles(&after));
+    assert_eq!(old.indices.len(), new.indices.len());
+    for (a, b) in old.indices.iter().zip(&new.indices) {
+        for (a, b) in a.iter().zip(b) {
+            assert_eq!(old.positions[*a as usize], new.positions[*b as usize]);
+            assert_eq!(old.texcoords[0][*a as usize], new.texcoords[0][*b as usize]);
+        }
+    }
+    let position = &document["accessors"][attributes["POSITION"].as_u64().unwrap() as usize];
+    assert_eq!(
+        (&position["min"], &position["max"]),
+        (&serde_json::json!([0.0, 0.0, -1.0]), &serde_json::json!([1.0, 1.0, 0.0]))
+    );
+
+    // what is baked is what is traced: half of the fold is open
+    let record = bakes(&[&model, "-o", &glb, "--size", "128", "--spp", "256", "--verify"]);
+    let verify = &record["verify"];
+    assert!(verify["pixels"].as_u64().unwrap() > 10_000, "{verify}");
+    assert!(verify["rmse"].as_f64().unwrap() < 0.03 && verify["bias"].as_f64().unwrap().abs() < 0.004, "{verify}");
+}
+
+#[test]
+fn a_text_file_refers_to_the_files_of_the_source() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = folded(dir.path());
+    fs::create_dir(dir.path().join("out")).unwrap();
+    let output = place(&dir, "out/baked.gltf");
+    let record = bakes(&[&model, "-o", &output, "--size", "32", "--spp", "4"]);
+    assert_eq!(record["files"].as_array().unwrap().len(), 3);
+    let text = fs::read_to_string(&output).unwrap();
+    assert!(text.contains(r#""uri":"../folded%20data.bin""#), "{text}");
+    assert!(dir.path().join("out/baked-paper-occlusion.png").is_file());
+    let scene = load(&output).unwrap();
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    assert!(scene.materials[0].occlusion_texture.is_some());
+
+    // a .glb has no text form here
+    refuses(&["bake", &output, "-o", &output], 64, "the output");
+}
+
+#[test]
+fn vertices_get_colours() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = folded(dir.path());
+    let glb = place(&dir, "colours.glb");
+    let record = bakes(&[&model, "-o", &glb, "--to", "vertices", "--spp", "1024"]);
+    assert_eq!((&record["vertices"], &record["rays"]), (&6.into(), &(6 * 1024).into()));
+    let scene = load(&glb).unwrap();
+    let colors = &triangles(&scene).colors;
+    assert_eq!(colors.len(), 6);
+    // near the fold half is open, far from it more
+    assert!(colors.iter().all(|c| c.x == c.y && c.y == c.z && c.w == 1.0));
+    let (near, far) = (colors[0].x, colors[1].x);
+    assert!(near > 0.5 && near < far && far < 1.0, "{near} {far}");
+}
+
+#[test]
+fn other_formats_become_gltf_and_images_have_a_file_each() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let glb = place(&dir, "box.glb");
+    let record = bakes(&["builtin:cornell-box", "-o", &glb, "--size", "64", "--spp", "4", "--ao-radius", "1"]);
+    assert!(record["textures"].as_array().unwrap().iter().all(|t| t["unwrapped"] == true));
+    let scene = load(&glb).unwrap();
+    assert!(scene.materials.iter().all(|m| m.occlusion_texture.is_some()));
+
+    // the model that has coordinates needs none, and its maps are files by material
+    let map = place(&dir, "map.exr");
+    let record = bakes(&[&glb, "-o", &map, "--size", "64", "--spp", "4", "--map", "thickness"]);
+    let files = record["files"].as_array().unwrap();
+    assert_eq!(files.len(), record["textures"].as_array().unwrap().len());
+    assert!(files.len() > 1);
+    let image = output::load(Path::new(files[0].as_str().unwrap())).unwrap();
+    assert!(image.f32("Y").unwrap().iter().all(|v| (0.0..=1.0).contains(v)));
+
+    // one material alone has the name that was given, and 16 bits
+    let name = record["textures"][0]["material"].as_str().unwrap();
+    let map = place(&dir, "normal.png");
+    bakes(&[&glb, "-o", &map, "--size", "32", "--map", "normal", "--material", name, "--bits", "16"]);
+    assert_eq!(image::open(&map).unwrap().color(), image::ColorType::Rgb16);
+}
+
+#[test]
+fn what_cannot_be_baked_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let model = folded(dir.path());
+    let [glb, png, gltf] = ["a.glb", "a.png", "a.gltf"].map(|n| place(&dir, n));
+    refuses(&["bake", &model, "-o", "a.jpg"], 64, ".png or .exr");
+    refuses(&["bake", &model, "-o", &glb, "--map", "normal"], 64, "a model holds ambient occlusion alone");
+    refuses(&["bake", &model, "-o", &png, "--to", "vertices"], 64, "an image has no vertices");
+    refuses(&["bake", &model, "-o", &png, "--verify"], 64, "--verify renders the written model");
+    refuses(&["bake", &model, "-o", &glb, "--size", "0"], 64, "from 1 to 16384");
+    refuses(&["bake", &model, "-o", &glb, "--texcoord", "x"], 64, "auto, unwrap or the number of a set");
+    refuses(&["bake", "none.glb", "-o", &glb], 3, "none.glb");
+    if !device() {
+        return;
+    }
+    let out = run(&["bake", &model, "-o", &png]);
+    fails(&out, 64, &["texture coordinates 0 overlap", "-o NAME.glb"]);
+    fails(&run(&["bake", &model, "-o", &glb, "--texcoord", "0"]), 64, &["overlap", "--texcoord unwrap"]);
+    fails(&run(&["bake", &model, "-o", &glb, "--material", "x"]), 64, &["--material x"]);
+    fails(&run(&["bake", "builtin:cornell-box", "-o", &gltf]), 64, &["becomes a .glb"]);
+    fails(&run(&["bake", &model, "-o", &png, "--map", "thickness", "--ao-radius", "inf"]), 64, &["needs a length"]);
+    assert!(!Path::new(&glb).exists() && !Path::new(&png).exists());
+}
