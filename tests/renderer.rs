@@ -81,7 +81,7 @@ fn gpu_pipelines_are_compiled_once() {
     // of its own: what other tests compile would be counted
     let device = new_device();
     let mut renderer =
-        Renderer::new(device.clone(), builtin::by_name("cornell-box").unwrap(), &choice(TracerKind::Compute)).unwrap();
+        Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(TracerKind::Compute)).unwrap();
     let mut compiled = |integrator: &str| {
         renderer.still(&small(integrator), &mut NoControl).unwrap();
         device.compiled_pipelines()

@@ -31,7 +31,8 @@ pub fn texture_companions(path: &Path, textures: &[PlannedTexture]) -> Vec<PathB
     companions(path, &textures.iter().map(texture_name).collect::<Vec<_>>())
 }
 
-/// Writes a model whose materials have these occlusion textures, that of a scene; returns the files.
+/// Writes a model whose materials have these occlusion textures; returns the files. `scene`: the
+/// one that was read from it.
 ///
 /// # Errors
 /// Those of [`AmendedFile`].

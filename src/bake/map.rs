@@ -62,20 +62,20 @@ impl TexelSums {
         if self.samples < 2 { 0.0 } else { (self.squares / n - (self.scalar / n).powi(2)).max(0.0) / (n - 1.0) }
     }
 
-    /// The same with a sample of 0 and one of 1 added, as the rule of succession has it: a few
-    /// samples that are all open do not say that the next one is.
+    /// That variance with a sample of 0 and one of 1 added, as the rule of succession has it: a
+    /// few samples that are all open do not say that the next one is.
     fn cautious_variance(&self) -> f64 {
         let n = f64::from(self.samples) + 2.0;
         ((self.squares + 1.0) / n - ((self.scalar + 1.0) / n).powi(2)).max(0.0) / (n - 1.0)
     }
 }
 
-/// What rays are traced against.
+/// The scene that rays are traced against.
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
     /// The scene: that of the surfaces, or a detailed model.
     pub scene: &'a Scene,
-    /// Its tracer.
+    /// Tracer of the scene.
     pub tracer: &'a Tracer,
     /// Origin of the tracer's coordinates.
     pub origin: DVec3,
@@ -175,7 +175,7 @@ struct Sampled {
     point: TexelPoint,
     /// The instance of its surface.
     instance: usize,
-    /// What rays leave from.
+    /// The record that rays leave from.
     record: BakePoint,
 }
 
@@ -240,7 +240,7 @@ impl<'a> Baker<'a> {
         let width = self.texture.size[0];
         let place = move |sample: &Sampled| (sample.point.texel[1] * width + sample.point.texel[0]) as usize;
 
-        // the samples of each, those of texels that see nothing and may be inside of something apart
+        // the samples of each, but for those that may be inside of something
         let sums = self.trace(&sampled, control)?;
         let is_hidden = self.are_hidden(&sampled, &sums, control)?;
         let mut hidden = BTreeSet::new();
@@ -376,7 +376,7 @@ impl<'a> Baker<'a> {
         Some(self.detailed[mesh].as_ref()?.at(primitive as usize, Vec2::new(u, v), instance as usize))
     }
 
-    /// What a point adds to the value of its texel, times its samples.
+    /// The value that a point adds to its texel, times its samples.
     fn point_value(&self, sample: &Sampled, out: PointSums, inside: PointSums) -> Vec3 {
         let samples = (1u32 << self.sample_bits) as f32;
         let scalar = |value: f32| Vec3::new(value, 0.0, 0.0);

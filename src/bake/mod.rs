@@ -143,7 +143,7 @@ pub struct BakeSettings {
     pub seed: u32,
     /// Which hits occlude, and how much; its radius is also that of thickness and curvature.
     pub occlusion: Occlusion,
-    /// What occludes.
+    /// The surfaces that occlude.
     pub occluders: Occluders,
     /// A plane under the scene occludes, too.
     pub has_ground: bool,

@@ -87,7 +87,8 @@ pub fn instances_of(scene: &Scene, mesh: usize) -> Vec<usize> {
 /// coordinates where it has no unique ones; `control` hears of making them.
 ///
 /// # Errors
-/// [`Error::Interrupted`], and [`Error::Usage`] where there are no unique coordinates, and none can be made.
+/// [`Error::Interrupted`], and [`Error::Usage`] where there are no unique coordinates, and none can
+/// be made.
 pub fn plan(
     scene: &Scene,
     file: Option<&SourceFile>,
@@ -104,7 +105,7 @@ pub fn plan(
         textures.push(plan_texture(scene, file, settings, &name, material, &meshes, control)?);
     }
     if let Some(missing) = settings.materials.iter().find(|wanted| !textures.iter().any(|t| t.name == **wanted)) {
-        return Err(Error::Usage(format!("--material {missing}: no surface has a material of that name")));
+        return Err(Error::Usage(format!("--only-material {missing}: no surface has a material of that name")));
     }
     if textures.is_empty() {
         return Err(Error::Scene(format!("{}: has no triangles, and nothing else has texels", scene.name)));

@@ -30,7 +30,7 @@ pub struct BakeSession<'a> {
     pub device: &'a Arc<Device>,
     /// The tracer and its options.
     pub tracing: &'a DeviceSettings,
-    /// What is baked.
+    /// The settings of what is baked.
     pub settings: &'a BakeSettings,
     /// A detailed model that is traced in place of the scene, and how far from the scene's surfaces
     /// its own may be, in scene units.

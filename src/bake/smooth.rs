@@ -33,47 +33,60 @@ const STRETCH: f64 = 2.0;
 
 /// Filters the values; those that no surface covers stay.
 pub fn smooth(texels: &mut [FilterTexel], [width, height]: [u32; 2]) {
-    let (width, height) = (width as usize, height as usize);
-    let pitch: Vec<f64> = (0..texels.len()).into_par_iter().map(|at| pitch_at(texels, at, width)).collect();
+    let size = [width as usize, height as usize];
+    let pitch: Vec<f64> = (0..texels.len()).into_par_iter().map(|at| pitch_at(texels, at, size[0])).collect();
     for pass in 0..PASSES {
-        let step = 1i64 << pass;
         let before: &[FilterTexel] = texels;
         let filtered: Vec<(Vec3, f32)> = (0..texels.len())
             .into_par_iter()
-            .map(|at| {
-                let own = before[at];
-                if !own.is_covered {
-                    return (own.value, own.variance);
-                }
-                let (mut sum, mut variance, mut total) = (Vec3::ZERO, 0.0, 0.0);
-                for (j, wy) in (-2i64..=2).zip(SPLINE) {
-                    for (i, wx) in (-2i64..=2).zip(SPLINE) {
-                        let (x, y) = ((at % width) as i64 + i * step, (at / width) as i64 + j * step);
-                        if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 {
-                            continue;
-                        }
-                        let other = before[y as usize * width + x as usize];
-                        let reach = STRETCH * pitch[at] * ((i * i + j * j) as f64).sqrt() * step as f64;
-                        if !other.is_covered || (other.position - own.position).length() > reach {
-                            continue;
-                        }
-                        let noise = NOISE * NOISE * (own.variance + other.variance) + 1e-8;
-                        let differs = (other.value - own.value).length_squared() / noise;
-                        let faces = own.normal.dot(other.normal).max(0.0).powi(NORMAL_POWER);
-                        let weight = wx * wy * faces * (-differs).exp();
-                        sum += weight * other.value;
-                        variance += weight * weight * other.variance;
-                        total += weight;
-                    }
-                }
-                // the texel itself has its weight, unless its normal is no unit vector
-                if total > 0.0 { (sum / total, variance / (total * total)) } else { (own.value, own.variance) }
-            })
+            .map(|at| filtered_texel(before, size, at, 1 << pass, pitch[at]))
             .collect();
         for (texel, (value, variance)) in texels.iter_mut().zip(filtered) {
             (texel.value, texel.variance) = (value, variance);
         }
     }
+}
+
+/// Value and variance of a texel after a pass of neighbours `step` texels apart. `pitch`: distance
+/// on the surface to the next texel.
+fn filtered_texel(
+    texels: &[FilterTexel],
+    [width, height]: [usize; 2],
+    at: usize,
+    step: i64,
+    pitch: f64,
+) -> (Vec3, f32) {
+    let own = texels[at];
+    if !own.is_covered {
+        return (own.value, own.variance);
+    }
+    let (mut sum, mut variance, mut total) = (Vec3::ZERO, 0.0, 0.0);
+    for (j, wy) in (-2i64..=2).zip(SPLINE) {
+        for (i, wx) in (-2i64..=2).zip(SPLINE) {
+            // neighbours of the same surface
+            let (x, y) = ((at % width) as i64 + i * step, (at / width) as i64 + j * step);
+            if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 {
+                continue;
+            }
+            let other = texels[y as usize * width + x as usize];
+            let reach = STRETCH * pitch * ((i * i + j * j) as f64).sqrt() * step as f64;
+            if !other.is_covered || (other.position - own.position).length() > reach {
+                continue;
+            }
+
+            // by what noise explains of the difference, and by how alike they face
+            let noise = NOISE * NOISE * (own.variance + other.variance) + 1e-8;
+            let differs = (other.value - own.value).length_squared() / noise;
+            let faces = own.normal.dot(other.normal).max(0.0).powi(NORMAL_POWER);
+            let weight = wx * wy * faces * (-differs).exp();
+            sum += weight * other.value;
+            variance += weight * weight * other.variance;
+            total += weight;
+        }
+    }
+
+    // the texel itself has its weight, unless its normal is no unit vector
+    if total > 0.0 { (sum / total, variance / (total * total)) } else { (own.value, own.variance) }
 }
 
 /// Distance on the surface from a texel to the next, scene units: the least to a covered

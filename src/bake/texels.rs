@@ -45,7 +45,7 @@ pub struct TexelPoint {
     pub barycentrics: Vec2,
 }
 
-/// What the points of a band of rows are.
+/// The points of a band of rows.
 #[derive(Default)]
 pub struct Band {
     /// Points by texel: row after row, those of a texel together.
@@ -138,7 +138,7 @@ impl Layout {
             });
         }
 
-        // texels of which a triangle has a corner or a strip only: the point nearest to their centres
+        // texels of which a triangle has a corner or a strip only: the point nearest to the centre
         for &index in &self.bands[band] {
             let triangle = &self.triangles[index as usize];
             self.visit(triangle, first, |at, corner| {
@@ -148,7 +148,7 @@ impl Layout {
                 }
                 let centre = corner + 0.5;
                 let (nearest, [_, u, v]) = nearest_point(&triangle.corners, centre);
-                if (nearest - centre).abs().max_element() <= 0.5 {
+                if (nearest - centre).abs().max_element() < 0.5 {
                     owners[0] = (index, false, Vec2::new(u as f32, v as f32));
                 }
             });

@@ -12,7 +12,7 @@ pub use crate::interface::records::bake::BakePoint;
 use crate::shaders;
 use crate::tracer::{Push, Stream, Tracer};
 
-/// What samples of a point measure.
+/// The quantity that samples of a point measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampling {
     /// Which hits occlude, and how much; for thickness its radius, which must be finite, is the

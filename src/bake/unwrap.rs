@@ -50,7 +50,8 @@ pub struct UnwrappedMesh {
 /// way.
 ///
 /// # Errors
-/// [`Error::Interrupted`], and [`Error::Usage`] if a texture of that size has no room for all charts.
+/// [`Error::Interrupted`], and [`Error::Usage`] if a texture of that size has no room for all
+/// charts.
 pub fn unwrap(
     scene: &Scene,
     file: &SourceFile,

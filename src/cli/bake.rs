@@ -106,7 +106,7 @@ pub struct BakeArgs {
     pub average_instances: bool,
     /// Bake this material alone; may be given several times [default: all]
     #[arg(long, value_name = "NAME")]
-    pub material: Vec<String>,
+    pub only_material: Vec<String>,
     /// Bits of a channel of PNG files and of textures in a model
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = parse_bits)]
     pub bits: Bits,
@@ -150,7 +150,7 @@ fn parse_bits(text: &str) -> Result<Bits, String> {
     }
 }
 
-/// What is written.
+/// The kind of file that is written.
 #[derive(Clone, Copy, PartialEq)]
 enum Output {
     /// A model with the results in it.
@@ -173,38 +173,34 @@ fn check(args: &BakeArgs) -> Result<Output> {
             )));
         }
     };
-    let usage = |text: String| Err(Error::Usage(text));
-    match output {
-        Output::Model if args.map != Map::Ao => usage(format!(
-            "--map {}: a model holds ambient occlusion alone; write an image, .png or .exr",
-            args.map.name()
-        )),
-        Output::Image if args.to == Target::Vertices => {
-            usage("--to vertices: an image has no vertices; write a model, .glb or .gltf".to_owned())
-        }
-        _ if args.from.is_some() && (args.to == Target::Vertices || args.occluders != Occluders::Scene) => {
-            usage("--from is for textures, and what it names occludes".to_owned())
-        }
-        _ if matches!(args.cage, Some(Length::Auto)) => usage("--cage: a length or a share is expected".to_owned()),
-        _ if args.target_error.is_some() && (args.to == Target::Vertices || !args.map.is_sampled()) => {
-            usage("--target-error is for textures of what is sampled".to_owned())
-        }
-        _ if args.denoise && args.to == Target::Vertices => {
-            usage("--denoise is for textures: vertices are the means of their triangles".to_owned())
-        }
-        _ if args.pack.is_some() && (output == Output::Image || args.to == Target::Vertices) => {
-            usage("--pack orm is for textures of a model".to_owned())
-        }
-        _ if args.pack.is_some() && args.bits == Bits::Sixteen => {
-            usage("--pack orm: packed textures have 8 bits a channel".to_owned())
-        }
-        Output::Image if args.verify => {
-            usage("--verify renders the written model: write one, .glb or .gltf".to_owned())
-        }
-        _ if args.verify && args.to == Target::Vertices => {
-            usage("--verify is for textures: colours of vertices are not rendered apart".to_owned())
-        }
-        _ => Ok(output),
+
+    // options that do not go together, and the remedy
+    let (is_image, to_vertices) = (output == Output::Image, args.to == Target::Vertices);
+    let is_packed = args.pack.is_some();
+    let refusals = [
+        (
+            !is_image && args.map != Map::Ao,
+            "--map: a model holds ambient occlusion alone; write an image, .png or .exr",
+        ),
+        (is_image && to_vertices, "--to vertices: an image has no vertices; write a model, .glb or .gltf"),
+        (
+            args.from.is_some() && (to_vertices || args.occluders != Occluders::Scene),
+            "--from is for textures, and what it names occludes",
+        ),
+        (matches!(args.cage, Some(Length::Auto)), "--cage: a length or a share is expected"),
+        (
+            args.target_error.is_some() && (to_vertices || !args.map.is_sampled()),
+            "--target-error is for textures of what is sampled",
+        ),
+        (args.denoise && to_vertices, "--denoise is for textures: vertices are the means of their triangles"),
+        (is_packed && (is_image || to_vertices), "--pack orm is for textures of a model"),
+        (is_packed && args.bits == Bits::Sixteen, "--pack orm: packed textures have 8 bits a channel"),
+        (is_image && args.verify, "--verify renders the written model: write one, .glb or .gltf"),
+        (args.verify && to_vertices, "--verify is for textures: colours of vertices are not rendered apart"),
+    ];
+    match refusals.into_iter().find(|(is_refused, _)| *is_refused) {
+        Some((_, reason)) => Err(Error::Usage(reason.to_owned())),
+        None => Ok(output),
     }
 }
 
@@ -273,35 +269,7 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         "scene": args.scene, "map": args.map.name(), "to": args.to.name(),
         "ao_radius": settings.occlusion.radius, "spp": settings.spp,
     });
-    let (written, what, rays) = match (args.to, model) {
-        (Target::Vertices, None) => return Err(Error::Usage("--to vertices needs a model".to_owned())),
-        (Target::Vertices, Some(model)) => {
-            let (baked, rays) = session.bake_vertices(model.file.source(), &mut control)?;
-            let count: usize = baked.iter().map(|b| b.values.len()).sum();
-            record["vertices"] = json!(count);
-            (document::save_vertices(model.file, &baked, &args.output)?, format!("{count} vertices"), rays)
-        }
-        (Target::Texture, model) => {
-            let maps = session.bake_textures(&planned, &mut control)?;
-            let rays = maps.iter().map(|m| m.rays).sum();
-            record["textures"] = planned.iter().zip(&maps).map(|(t, m)| texture_record(t, m)).collect();
-            let what = describe(&maps);
-            let baked = planned.into_iter().zip(maps).collect::<Vec<_>>();
-            let written = match model {
-                Some(model) => {
-                    let images = TextureImages { bits: args.bits, are_packed: args.pack.is_some() };
-                    document::save_textures(model.file, &scene, &baked, &settings, images, &args.output)?
-                }
-                None => {
-                    for ((_, map), path) in baked.iter().zip(&paths) {
-                        picture::save(map, &settings, args.bits, path)?;
-                    }
-                    paths
-                }
-            };
-            (written, what, rays)
-        }
-    };
+    let (written, what, rays) = bake_and_write(args, &session, model, planned, paths, &mut record, &mut control)?;
     drop(control);
     device.check_validation()?;
     device.save_pipeline_cache();
@@ -324,6 +292,48 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     }
     record["warnings"] = json!(warnings.list);
     console.record(&record)
+}
+
+/// Bakes, and writes the results; returns the files, a sentence on what they have, and the number of
+/// rays.
+fn bake_and_write(
+    args: &BakeArgs,
+    session: &BakeSession,
+    model: Option<ModelFile>,
+    planned: Vec<PlannedTexture>,
+    paths: Vec<PathBuf>,
+    record: &mut serde_json::Value,
+    control: &mut ProgressControl,
+) -> Result<(Vec<PathBuf>, String, u64)> {
+    match (args.to, model) {
+        (Target::Vertices, None) => Err(Error::Usage("--to vertices needs a model".to_owned())),
+        (Target::Vertices, Some(model)) => {
+            let (baked, rays) = session.bake_vertices(model.file.source(), control)?;
+            let count: usize = baked.iter().map(|b| b.values.len()).sum();
+            record["vertices"] = json!(count);
+            Ok((document::save_vertices(model.file, &baked, &args.output)?, format!("{count} vertices"), rays))
+        }
+        (Target::Texture, model) => {
+            let maps = session.bake_textures(&planned, control)?;
+            let rays = maps.iter().map(|m| m.rays).sum();
+            record["textures"] = planned.iter().zip(&maps).map(|(t, m)| texture_record(t, m)).collect();
+            let what = describe(&maps);
+            let baked = planned.into_iter().zip(maps).collect::<Vec<_>>();
+            let written = match model {
+                Some(model) => {
+                    let images = TextureImages { bits: args.bits, are_packed: args.pack.is_some() };
+                    document::save_textures(model.file, session.scene, &baked, session.settings, images, &args.output)?
+                }
+                None => {
+                    for ((_, map), path) in baked.iter().zip(&paths) {
+                        picture::save(map, session.settings, args.bits, path)?;
+                    }
+                    paths
+                }
+            };
+            Ok((written, what, rays))
+        }
+    }
 }
 
 /// The file that a model is written into.
@@ -399,7 +409,7 @@ fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, V
         is_smoothed: args.denoise,
         space: args.space,
         averages_instances: args.average_instances,
-        materials: args.material.clone(),
+        materials: args.only_material.clone(),
     };
     if renderer.scene().rig.is_some() {
         remarks.push("the scene is animated: its rest pose is baked".to_owned());
@@ -429,7 +439,7 @@ fn image_paths(args: &BakeArgs, output: Output, planned: &[PlannedTexture]) -> V
     planned.iter().map(path).collect()
 }
 
-/// What was baked, in words.
+/// A sentence on the textures that were baked.
 fn describe(maps: &[BakedMap]) -> String {
     let sizes: std::collections::BTreeSet<String> =
         maps.iter().map(|m| format!("{}x{}", m.size[0], m.size[1])).collect();

@@ -216,8 +216,8 @@ pub enum Source {
         /// For devices with 64-bit integers and subgroup ballots.
         ballot: bool,
     },
-    /// A pass that traces its rays itself, by the compute tracer's functions, on devices with 64-bit
-    /// integers and subgroups of a known size.
+    /// A pass that traces its rays itself, by the compute tracer's functions, on devices with
+    /// 64-bit integers and subgroups of a known size.
     Tracing {
         /// File in shaders/, without its ending.
         pass: &'static str,

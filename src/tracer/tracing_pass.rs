@@ -45,8 +45,8 @@ impl Tracer {
         }
     }
 
-    /// Compiles a pass that traces its rays itself, where [`Tracer::can_trace_in_passes`] says so. A
-    /// lane processes several items, one after the other.
+    /// Compiles a pass that traces its rays itself, where [`Tracer::can_trace_in_passes`] says so.
+    /// A lane processes several items, one after the other.
     ///
     /// # Errors
     /// Those of the device; [`Error::Usage`] where it cannot.

@@ -190,7 +190,7 @@ fn other_formats_become_gltf_and_images_have_a_file_each() {
     // one material alone has the name that was given, and 16 bits
     let name = record["textures"][0]["material"].as_str().unwrap();
     let map = place(&dir, "normal.png");
-    bakes(&[&glb, "-o", &map, "--size", "32", "--map", "normal", "--material", name, "--bits", "16"]);
+    bakes(&[&glb, "-o", &map, "--size", "32", "--map", "normal", "--only-material", name, "--bits", "16"]);
     assert_eq!(image::open(&map).unwrap().color(), image::ColorType::Rgb16);
 }
 
@@ -212,7 +212,7 @@ fn what_cannot_be_baked_is_refused() {
     let out = run(&["bake", &model, "-o", &png]);
     fails(&out, 64, &["texture coordinates 0 overlap", "-o NAME.glb"]);
     fails(&run(&["bake", &model, "-o", &glb, "--texcoord", "0"]), 64, &["overlap", "--texcoord unwrap"]);
-    fails(&run(&["bake", &model, "-o", &glb, "--material", "x"]), 64, &["--material x"]);
+    fails(&run(&["bake", &model, "-o", &glb, "--only-material", "x"]), 64, &["--only-material x"]);
     fails(&run(&["bake", "builtin:cornell-box", "-o", &gltf]), 64, &["becomes a .glb"]);
     fails(&run(&["bake", &model, "-o", &png, "--map", "thickness", "--ao-radius", "inf"]), 64, &["needs a length"]);
     assert!(!Path::new(&glb).exists() && !Path::new(&png).exists());

@@ -3,12 +3,12 @@
 
 use std::fmt;
 
+use super::settings::PathKernel;
 use super::{PathEstimator, TracedBy};
 use crate::accel::few::MAX_LEAVES;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Timing};
 use crate::interface::{PathFeature, PathFeatures};
-use crate::settings::choices;
 use crate::tracer::{Push, Tracer};
 
 /// Number of regions of the wavefront, camera rays, bounces and shadow rays, whose work the kernel
@@ -16,18 +16,6 @@ use crate::tracer::{Push, Tracer};
 pub(super) const STEPS: u32 = 8;
 /// Bytes of what the kernel counts ([`super::params::PathParams::counts`]).
 const COUNTED_BYTES: u64 = 12;
-
-choices! {
-    /// How paths are traced; images are the same.
-    pub enum PathKernel {
-        /// The megakernel for scenes of few primitives on CPU drivers, else the wavefront
-        Auto = "auto",
-        /// A kernel for each step: rays and states are handed on in memory
-        Wavefront = "wavefront",
-        /// One kernel for whole paths, for static scenes of few primitives on CPU drivers
-        Megakernel = "megakernel",
-    }
-}
 
 /// How paths are traced, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -48,9 +48,9 @@ use light_sources::LightSources;
 use lights::LightBuilder;
 use lights::device::DeviceLights;
 use media::ClosedVolumes;
-pub use megakernel::{PathKernel, Schedule};
+pub use megakernel::Schedule;
 use params::{LaunchParams, PathFrameParams, PathParams, QUAD_BYTES};
-pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
+pub use settings::{Lens, MAX_DEPTH, PathKernel, PathOptions, Strategy, TextureFilter};
 
 /// Minimum number of bounces per submission, after which the host reads how many paths are left.
 const MIN_BOUNCES: u32 = 4;
@@ -208,7 +208,7 @@ struct TransmittedShadowRays {
     count: Buffer,
 }
 
-/// What traces the paths of all launches.
+/// The passes that trace the paths of all launches.
 enum TracedBy {
     Wavefront(Arc<Wavefront>),
     Megakernel(TracingPass),

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::ambient::{Ambient, EnvironmentLight, OccludedLight};
 use super::params::PathParams;
-use super::{PathKernel, PixelFilter, View};
+use super::{PixelFilter, View};
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
 use crate::integrators::RenderJob;
@@ -83,6 +83,18 @@ pub struct Lens {
     pub radius: f32,
     /// Focus distance along the view, scene units.
     pub focus: f32,
+}
+
+choices! {
+    /// How paths are traced; images are the same.
+    pub enum PathKernel {
+        /// The megakernel for scenes of few primitives on CPU drivers, else the wavefront
+        Auto = "auto",
+        /// A kernel for each step: rays and states are handed on in memory
+        Wavefront = "wavefront",
+        /// One kernel for whole paths, for static scenes of few primitives on CPU drivers
+        Megakernel = "megakernel",
+    }
 }
 
 settings! {

@@ -126,8 +126,8 @@ records! {
         placed_shares: address,
         /// The options that are numbers.
         options: PathOptionsRecord,
-        /// Three uints that `path_megakernel` adds to: numbers of bounce rays and of shadow rays, and
-        /// bounces of the longest path.
+        /// Three uints that `path_megakernel` adds to: numbers of bounce rays and of shadow rays,
+        /// and bounces of the longest path.
         counts: address,
         /// Maximum number of rays of a path in `path_megakernel`, without the camera ray.
         max_rays: uint,
@@ -141,7 +141,7 @@ records! {
         occlusion: OcclusionRecord,
         /// Number of leaves of a scene that has few, for `path_megakernel`.
         few_count: uint,
-        /// Those leaves, then their boxes of eight floats (shaders/trace/few.glsl).
+        /// Address of those leaves, then of their boxes of eight floats (shaders/trace/few.glsl).
         few: address,
         /// Padding to a multiple of 16 bytes.
         reserved: address,

@@ -40,7 +40,7 @@ struct AddedView {
     /// Offset in the added bytes, and length.
     offset: usize,
     length: usize,
-    /// What it is used for; `None` for images.
+    /// The use of its bytes; `None` for images.
     target: Option<u32>,
     /// Bytes from one vertex to the next, where that is not the size of an element.
     stride: Option<usize>,

@@ -14,8 +14,13 @@ pub(super) struct Decoded {
 }
 
 /// Bytes in the memory that their decoder has filled: a copy of them would be as large again.
+#[cfg_attr(
+    not(any(feature = "draco", feature = "meshopt")),
+    expect(dead_code, reason = "without a decoder nothing makes any")
+)]
 pub(super) enum DecodedBytes {
     Bytes(Vec<u8>),
+    #[cfg(feature = "meshopt")]
     Halfwords(Vec<u16>),
     Words(Vec<u32>),
 }
@@ -26,6 +31,7 @@ impl std::ops::Deref for DecodedBytes {
     fn deref(&self) -> &[u8] {
         match self {
             Self::Bytes(bytes) => bytes,
+            #[cfg(feature = "meshopt")]
             Self::Halfwords(halfwords) => bytemuck::cast_slice(halfwords),
             Self::Words(words) => bytemuck::cast_slice(words),
         }

@@ -10,6 +10,7 @@ use glam::Vec3;
 
 use super::accessor::{BufferBytes, Reader};
 use super::decoded::Decoded;
+use super::values::AccessorIndex;
 use super::{compressed, container, mesh};
 use crate::error::{Error, Result};
 use crate::memory::Budget;
@@ -93,7 +94,7 @@ pub struct SourcePrimitive {
     pub positions: Vec<Vec3>,
     /// Corners of its triangles, whether the file has a list, a strip or a fan.
     pub triangles: Vec<[u32; 3]>,
-    /// Its attributes.
+    /// Attributes of its vertices.
     pub attributes: Vec<StoredAttribute>,
     /// Attributes of each of its morph targets.
     pub targets: Vec<Vec<StoredAttribute>>,
@@ -178,46 +179,18 @@ impl SourceFile {
             Reader { document: &self.document, buffers: &self.buffers, decoded: &self.decoded, budget: &self.budget };
         let triangles = mesh::read(&reader, primitive, false, &[], &mut |_| {})?.ok_or("has no triangles")?;
         let vertices = triangles.positions.len();
-        let attribute = |name: String, accessor| {
-            let stored = reader.stored(accessor)?;
-            if stored.count != vertices {
-                return Err(format!("attribute {name} has {} elements for {vertices} vertices", stored.count));
-            }
-            let component = match stored.component {
-                ComponentType::I8 => 5120,
-                ComponentType::U8 => 5121,
-                ComponentType::I16 => 5122,
-                ComponentType::U16 => 5123,
-                ComponentType::U32 => 5125,
-                ComponentType::F32 => 5126,
-            };
-            let shape = match stored.shape {
-                Type::Scalar => "SCALAR",
-                Type::Vec2 => "VEC2",
-                Type::Vec3 => "VEC3",
-                Type::Vec4 => "VEC4",
-                Type::Mat2 => "MAT2",
-                Type::Mat3 => "MAT3",
-                Type::Mat4 => "MAT4",
-            };
-            Ok(StoredAttribute {
-                name,
-                size: stored.shape.multiplicity() * stored.component.size(),
-                bytes: stored.bytes,
-                shape: shape.to_owned(),
-                component,
-                normalized: stored.normalized,
-            })
-        };
+        let read = |name: String, accessor| stored_attribute(&reader, name, accessor, vertices);
+
+        // attributes of the vertices, and of each morph target
         let attributes = primitive.attributes.iter().filter_map(|(semantic, accessor)| {
             let semantic = super::values::valid(semantic.clone())?;
-            Some(attribute(semantic.to_string(), *accessor))
+            Some(read(semantic.to_string(), *accessor))
         });
         let attributes = attributes.collect::<Result<_, _>>()?;
         let mut targets = Vec::new();
         for target in primitive.targets.iter().flatten() {
             let parts = [("POSITION", target.positions), ("NORMAL", target.normals), ("TANGENT", target.tangents)];
-            let parts = parts.into_iter().filter_map(|(name, accessor)| Some(attribute(name.to_owned(), accessor?)));
+            let parts = parts.into_iter().filter_map(|(name, accessor)| Some(read(name.to_owned(), accessor?)));
             targets.push(parts.collect::<Result<_, _>>()?);
         }
         Ok(SourcePrimitive {
@@ -228,4 +201,42 @@ impl SourceFile {
             is_draco: compressed::draco_extension(primitive).is_some(),
         })
     }
+}
+
+/// An attribute of a primitive of so many vertices.
+fn stored_attribute(
+    reader: &Reader,
+    name: String,
+    accessor: AccessorIndex,
+    vertices: usize,
+) -> Result<StoredAttribute, String> {
+    let stored = reader.stored(accessor)?;
+    if stored.count != vertices {
+        return Err(format!("attribute {name} has {} elements for {vertices} vertices", stored.count));
+    }
+    let component = match stored.component {
+        ComponentType::I8 => 5120,
+        ComponentType::U8 => 5121,
+        ComponentType::I16 => 5122,
+        ComponentType::U16 => 5123,
+        ComponentType::U32 => 5125,
+        ComponentType::F32 => 5126,
+    };
+    let shape = match stored.shape {
+        Type::Scalar => "SCALAR",
+        Type::Vec2 => "VEC2",
+        Type::Vec3 => "VEC3",
+        Type::Vec4 => "VEC4",
+        Type::Mat2 => "MAT2",
+        Type::Mat3 => "MAT3",
+        Type::Mat4 => "MAT4",
+    };
+    Ok(StoredAttribute {
+        name,
+        size: stored.shape.multiplicity() * stored.component.size(),
+        bytes: stored.bytes,
+        shape: shape.to_owned(),
+        component,
+        normalized: stored.normalized,
+    })
 }
