@@ -294,8 +294,8 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     console.record(&record)
 }
 
-/// Bakes, and writes the results; returns the files, a sentence on what they have, and the number of
-/// rays.
+/// Bakes, and writes the results; returns the files, a sentence on what they have, and the number
+/// of rays.
 fn bake_and_write(
     args: &BakeArgs,
     session: &BakeSession,
