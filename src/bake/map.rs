@@ -105,13 +105,17 @@ pub fn bake(
     // bands of rows, so many that their points are a batch
     let bands_at_a_time = (BATCH / (POINTS * (texture.size[0] * BAND) as usize)).max(1);
     let bands = layout.band_count();
+    let instances = texture.surfaces.iter().map(|s| s.instances.len()).max().unwrap_or_default();
+    let points_at_a_time = if settings.averages_instances { BATCH / instances.max(1) } else { BATCH };
     for first in (0..bands).step_by(bands_at_a_time) {
         if control.should_stop()? {
             return Err(Error::Interrupted);
         }
         let found = layout.points(first..(first + bands_at_a_time).min(bands));
         let points: Vec<TexelPoint> = found.into_iter().flat_map(|band| band.points).collect();
-        map.hidden += baker.add(&points, &mut texels, control)?;
+        for part in parts_of_texels(&points, points_at_a_time) {
+            map.hidden += baker.add(part, &mut texels, control)?;
+        }
         control.progress((first + bands_at_a_time).min(bands) as u64, bands as u64);
     }
     map.rays = baker.rays;
@@ -139,6 +143,21 @@ pub fn bake(
     });
     map.values = filled.collect();
     Ok(map)
+}
+
+/// Points in parts of about so many, each of which has all points of its texels.
+fn parts_of_texels(points: &[TexelPoint], most: usize) -> Vec<&[TexelPoint]> {
+    let (mut parts, mut rest) = (Vec::new(), points);
+    while !rest.is_empty() {
+        let mut end = most.clamp(1, rest.len());
+        while end < rest.len() && rest[end].texel == rest[end - 1].texel {
+            end += 1;
+        }
+        let (part, after) = rest.split_at(end);
+        parts.push(part);
+        rest = after;
+    }
+    parts
 }
 
 /// Filters noise in the texture.

@@ -1,14 +1,13 @@
 //! Occlusion, roughness and metalness in one texture: red, green and blue, as glTF lets materials
 //! share it.
 
-use std::io::Cursor;
-
 use glam::{Affine2, Vec2, Vec3};
-use image::{ExtendedColorType, ImageFormat as Format};
+use image::ExtendedColorType;
 
 use super::map::BakedMap;
+use super::picture;
 use super::plan::PlannedTexture;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::scene::{Material, Scene, Texture};
 
 /// The texture of roughness and metalness that a baked one can share, or why there is none, in
@@ -48,17 +47,7 @@ pub fn png(map: &BakedMap, partner: &Texture) -> Result<Vec<u8>> {
             bytes.extend([red, packed.y, packed.z].map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8));
         }
     }
-    let mut png = Vec::new();
-    image::write_buffer_with_format(
-        &mut Cursor::new(&mut png),
-        &bytes,
-        size[0],
-        size[1],
-        ExtendedColorType::Rgb8,
-        Format::Png,
-    )
-    .map_err(|e| Error::Usage(format!("the packed texture cannot be written as PNG: {e}")))?;
-    Ok(png)
+    picture::encode(&bytes, size, ExtendedColorType::Rgb8)
 }
 
 /// The value at a point of an image, whose borders repeat.

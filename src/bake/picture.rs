@@ -37,7 +37,7 @@ fn unit_values(map: &BakedMap, settings: &BakeSettings) -> Vec<Vec3> {
 /// A map as a PNG file: grey, or RGB for vectors.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] and others of the encoder, as text.
+/// [`Error::Usage`] with the encoder's message.
 pub fn png(map: &BakedMap, settings: &BakeSettings, bits: Bits) -> Result<Vec<u8>> {
     let channels = if settings.map.is_vector() { 3 } else { 1 };
     let values = unit_values(map, settings);
@@ -48,9 +48,16 @@ pub fn png(map: &BakedMap, settings: &BakeSettings, bits: Bits) -> Result<Vec<u8
         (Bits::Sixteen, 1) => (components.flat_map(|v| sixteen(v).to_ne_bytes()).collect(), ExtendedColorType::L16),
         (Bits::Sixteen, _) => (components.flat_map(|v| sixteen(v).to_ne_bytes()).collect(), ExtendedColorType::Rgb16),
     };
+    encode(&bytes, map.size, colour)
+}
+
+/// Components of pixels as a PNG file.
+///
+/// # Errors
+/// [`Error::Usage`] with the encoder's message.
+pub(super) fn encode(bytes: &[u8], [width, height]: [u32; 2], colour: ExtendedColorType) -> Result<Vec<u8>> {
     let mut png = Vec::new();
-    let [width, height] = map.size;
-    image::write_buffer_with_format(&mut Cursor::new(&mut png), &bytes, width, height, colour, Format::Png)
+    image::write_buffer_with_format(&mut Cursor::new(&mut png), bytes, width, height, colour, Format::Png)
         .map_err(|e| Error::Usage(format!("the map cannot be written as PNG: {e}")))?;
     Ok(png)
 }

@@ -12,6 +12,9 @@ pub use crate::interface::records::bake::BakePoint;
 use crate::shaders;
 use crate::tracer::{Push, Stream, Tracer};
 
+/// Points whose samples are counted in 32 bits, however many each has.
+const MAX_POINTS: usize = 1 << 20;
+
 /// The quantity that samples of a point measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampling {
@@ -78,10 +81,15 @@ impl<'t> PointTracer<'t> {
     /// # Errors
     /// Those of the device, and of `control`.
     pub fn trace(&mut self, points: &[BakePoint], control: &mut dyn Control) -> Result<Vec<PointSums>> {
-        if points.is_empty() {
-            return Ok(Vec::new());
+        let mut sums = Vec::with_capacity(points.len());
+        for part in points.chunks(MAX_POINTS) {
+            sums.extend(self.trace_part(part, control)?);
         }
+        Ok(sums)
+    }
 
+    /// As [`PointTracer::trace`], for at most [`MAX_POINTS`] and at least one.
+    fn trace_part(&mut self, points: &[BakePoint], control: &mut dyn Control) -> Result<Vec<PointSums>> {
         // what shaders read and write
         let device = self.tracer.device();
         let Sampling { occlusion, is_inward, has_lengths, has_directions, seed, sample_bits } = self.sampling;

@@ -39,6 +39,8 @@ const EXAMPLES: &str = "Examples:
 
 /// Largest width and height of a texture.
 const MAX_SIZE: u32 = 16384;
+/// Largest number of samples of a triangle's corner.
+const MAX_CORNER_SPP: u32 = 1024;
 
 /// `skylit bake`.
 #[derive(Clone, Debug, Args)]
@@ -59,7 +61,7 @@ pub struct BakeArgs {
     /// Width and height of textures in texels, WIDTHxHEIGHT or one number
     #[arg(long, value_name = "SIZE", default_value = "1024", value_parser = parse_size)]
     pub size: [u32; 2],
-    /// Samples per texel, or per corner of a triangle with --to vertices
+    /// Samples per texel, or per corner of a triangle with --to vertices; rounded up to a power of two
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub spp: u32,
     /// More samples for texels whose standard error is larger, 64 times --spp at most
@@ -196,6 +198,7 @@ fn check(args: &BakeArgs) -> Result<Output> {
         (is_packed && (is_image || to_vertices), "--pack orm is for textures of a model"),
         (is_packed && args.bits == Bits::Sixteen, "--pack orm: packed textures have 8 bits a channel"),
         (is_image && args.verify, "--verify renders the written model: write one, .glb or .gltf"),
+        (to_vertices && args.spp > MAX_CORNER_SPP, "--spp: corners of triangles have at most 1024 samples"),
         (args.verify && to_vertices, "--verify is for textures: colours of vertices are not rendered apart"),
     ];
     match refusals.into_iter().find(|(is_refused, _)| *is_refused) {
@@ -375,6 +378,7 @@ impl ModelFile {
 
 /// The settings of baking, with a radius in scene units, and sentences on what was chosen.
 fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>)> {
+    renderer.apply_scene_settings(&args.meaning)?;
     let bounds = renderer.scene().bounds();
     let diagonal = bounds.map_or(1.0, |(low, high)| (high - low).length());
     let mut remarks = Vec::new();

@@ -205,10 +205,13 @@ fn what_cannot_be_baked_is_refused() {
     refuses(&["bake", &model, "-o", &png, "--verify"], 64, "--verify renders the written model");
     refuses(&["bake", &model, "-o", &glb, "--size", "0"], 64, "from 1 to 16384");
     refuses(&["bake", &model, "-o", &glb, "--texcoord", "x"], 64, "auto, unwrap or the number of a set");
+    refuses(&["bake", &model, "-o", &glb, "--to", "vertices", "--spp", "2000"], 64, "at most 1024 samples");
     refuses(&["bake", "none.glb", "-o", &glb], 3, "none.glb");
     if !device() {
         return;
     }
+    // what the scene's options say counts, with a radius, too
+    fails(&run(&["bake", &model, "-o", &glb, "--ao-radius", "1", "--hide", "nothing"]), 64, &["--hide nothing"]);
     let out = run(&["bake", &model, "-o", &png]);
     fails(&out, 64, &["texture coordinates 0 overlap", "-o NAME.glb"]);
     fails(&run(&["bake", &model, "-o", &glb, "--texcoord", "0"]), 64, &["overlap", "--texcoord unwrap"]);

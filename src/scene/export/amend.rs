@@ -72,12 +72,6 @@ impl AmendedFile {
         &self.source
     }
 
-    /// Name of a material; empty if it has none.
-    pub fn material_name(&self, material: usize) -> String {
-        let found = self.root.list("materials").get(material).and_then(|m| Object::parse(m.get().as_bytes()).ok());
-        found.and_then(|m| serde_json::from_str(m.get("name")?.get()).ok()).unwrap_or_default()
-    }
-
     /// Appends a value to a list of the file, which is made where there is none; returns its index.
     fn push(&mut self, list: &str, value: &Value) -> usize {
         let mut values = self.root.list(list);
