@@ -126,6 +126,7 @@ impl SceneSettings {
             }
         }
         let [mut hidden, only] = found;
+        let only: BTreeSet<usize> = only.into_iter().collect();
         if !only.is_empty() {
             hidden.extend((0..scene.instances.len()).filter(|k| !only.contains(k)));
         }

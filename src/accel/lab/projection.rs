@@ -228,13 +228,15 @@ pub(super) fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use glam::Vec3;
 
+    const SEED: u64 = 0x1234_5678_9abc_def1;
+
     /// Numbers in [0, 1), the same on every machine.
-    fn numbers() -> impl FnMut() -> f64 {
-        let mut state = 0x1234_5678_9abc_def1u64;
+    pub(in super::super) fn numbers(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
         move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
@@ -270,7 +272,7 @@ mod tests {
 
     #[test]
     fn parallel_projection_is_that_of_random_lines() {
-        let mut next = numbers();
+        let mut next = numbers(SEED);
         for case in 0..8 {
             let bounds = some_box(&mut next);
             let v = DVec3::new(next() - 0.5, next() - 0.5, next() - 0.5) * (1.0 + 5.0 * next());
@@ -288,7 +290,7 @@ mod tests {
 
     #[test]
     fn solid_angles_are_those_of_random_directions() {
-        let mut next = numbers();
+        let mut next = numbers(SEED);
         for case in 0..10 {
             let bounds = some_box(&mut next);
             let eye = DVec3::new(next(), next(), next()) * 6.0 - 3.0;
@@ -307,7 +309,7 @@ mod tests {
     /// Boxes before, behind, around and beside the eye: the share of the image that they cover.
     #[test]
     fn areas_in_a_view_are_those_of_random_points_of_the_image() {
-        let mut next = numbers();
+        let mut next = numbers(SEED);
         let mut seen = 0;
         for case in 0..80 {
             let bounds = some_box(&mut next);
