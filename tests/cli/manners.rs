@@ -257,3 +257,44 @@ fn gpu_progress_in_a_log() {
         assert!(lines(options, seconds).is_empty(), "{options:?}");
     }
 }
+
+/// Loading is shown, too: how many of a file's textures are decoded.
+#[test]
+fn progress_of_loading() {
+    const TEXTURES: usize = 40;
+    let dir = tempfile::tempdir().unwrap();
+    for k in 0..TEXTURES {
+        let texels = image::RgbaImage::from_fn(1024, 1024, |x, y| image::Rgba([x as u8, y as u8, k as u8, 255]));
+        texels.save(place(&dir, &format!("{k}.png"))).unwrap();
+    }
+    let triangle: Vec<u8> =
+        [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    std::fs::write(place(&dir, "t.bin"), triangle).unwrap();
+    let list = |entry: &dyn Fn(usize) -> Value| (0..TEXTURES).map(entry).collect::<Vec<_>>();
+    let file = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }],
+        "buffers": [{ "uri": "t.bin", "byteLength": 36 }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }],
+        "meshes": [{ "primitives": list(&|k| serde_json::json!({ "attributes": { "POSITION": 0 }, "material": k })) }],
+        "images": list(&|k| serde_json::json!({ "uri": format!("{k}.png") })),
+        "textures": list(&|k| serde_json::json!({ "source": k })),
+        "materials": list(&|k| serde_json::json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": k } } })),
+    });
+    let path = place(&dir, "many.gltf");
+    std::fs::write(&path, file.to_string()).unwrap();
+    let lines = |options: &[&str], seconds: &str| {
+        let args = [&["info", &path, "--no-device"], options].concat();
+        // on one thread it takes long enough for a look at it
+        let out = skylit(&args).env("SKYLIT_PROGRESS_SECONDS", seconds).env("RAYON_NUM_THREADS", "1").output().unwrap();
+        assert!(out.status.success(), "{}", stderr(&out));
+        let shown = |l: &&str| l.starts_with("skylit: loading many.gltf: ") && l.contains(" % after ");
+        stderr(&out).lines().filter(shown).count()
+    };
+    assert!((1..TEXTURES).contains(&lines(&[], "0.01")));
+    for (options, seconds) in [(&["--json"][..], "0.001"), (&[], "0"), (&[], "60")] {
+        assert_eq!(lines(options, seconds), 0, "{options:?}");
+    }
+}

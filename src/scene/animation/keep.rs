@@ -1,7 +1,9 @@
 //! Updates of a rig while loaders repair its scene: meshes and instances are dropped, vertices
-//! reordered.
+//! reordered, and all is turned where another axis points up.
 
-use super::{AnimationRig, Deformation};
+use glam::{DAffine3, DQuat, DVec3};
+
+use super::{AnimationRig, Deformation, LocalTransform, Node, Target};
 use crate::scene::Scene;
 
 impl AnimationRig {
@@ -57,5 +59,44 @@ impl AnimationRig {
         for deformation in &mut self.parts.deformations {
             deformation.mesh = index[deformation.mesh];
         }
+    }
+
+    /// Turns all that has a node, by a node above all others. The scene shows it from the next
+    /// [`AnimationRig::apply_rest_pose`] on.
+    pub(in crate::scene) fn turn(&mut self, rotation: DQuat) {
+        // parents come before their children: the new node is the first, and all indices grow by one
+        let parts = &mut self.parts;
+        for node in &mut parts.nodes {
+            node.parent = Some(node.parent.map_or(0, |p| p + 1));
+        }
+        let local = LocalTransform::Trs { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
+        parts.nodes.insert(0, Node { name: "up axis".to_owned(), local, ..Node::default() });
+
+        // what names nodes
+        let joints = parts.skins.iter_mut().flat_map(|s| &mut s.joints);
+        let deformations = parts.deformations.iter_mut().map(|d| &mut d.node);
+        let placed = parts.instances.iter_mut().chain(&mut parts.cameras).chain(&mut parts.lights).flatten();
+        let switched = parts.switched_instances.iter_mut().chain(&mut parts.switched_lights).map(|(_, node)| node);
+        joints.chain(deformations).chain(placed).chain(switched).for_each(|node| *node += 1);
+        for animation in &mut parts.animations {
+            animation.channels.iter_mut().for_each(|c| c.node += 1);
+            for channel in &mut animation.values {
+                if let Target::Visibility(node) = &mut channel.target {
+                    *node += 1;
+                }
+            }
+        }
+
+        let to_world = DAffine3::from_quat(rotation);
+        self.rest.iter_mut().for_each(|rest| *rest = to_world * *rest);
+        self.rest.insert(0, to_world);
+    }
+
+    /// Whether each instance of `scene` is placed by the rig: by a node, or by a skin.
+    pub(in crate::scene) fn placed_instances(&self, scene: &Scene) -> Vec<bool> {
+        let mut skinned = vec![false; scene.meshes.len()];
+        self.parts.deformations.iter().filter(|d| d.skin.is_some()).for_each(|d| skinned[d.mesh] = true);
+        let nodes = self.parts.instances.iter().map(Option::is_some).chain(std::iter::repeat(false));
+        scene.instances.iter().zip(nodes).map(|(instance, node)| node || skinned[instance.mesh]).collect()
     }
 }

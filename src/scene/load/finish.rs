@@ -51,12 +51,13 @@ pub(super) fn finish(scene: &mut Scene, path: &Path, options: GeometryOptions, b
         scene.report.normals_computed += usize::from(note.flat && scene.report.normals_replaced == 0);
         scene.report.tangents_computed += usize::from(note.tangents);
     }
-    if scene.rig.is_some() {
+    if let Some(rig) = &mut scene.rig {
+        orientation::turn_rig(rig, options.up);
         AnimationRig::apply_rest_pose(scene);
         check(scene, path)?;
     }
     drop_empty(scene);
-    orientation::apply(scene, options.up)?;
+    orientation::apply(scene, options.up);
     extent(scene, path)
 }
 
