@@ -28,6 +28,18 @@ lint:
 docs:
     cargo doc --locked --no-deps --document-private-items
 
+# documentation as a book, in target/book
+book:
+    mdbook build
+
+# pages of all commands and options, from the program's own definitions
+reference:
+    cargo run --locked -- man docs/reference/commands --format markdown
+
+# pages of what was measured, from saved records
+results:
+    python3 scripts/results.py
+
 # a kit for a machine with a GPU
 gpu:
     ./scripts/gpu.sh

@@ -68,7 +68,7 @@ pub fn render(scene: &str, image: &Path) -> skylit::Result<f64> {
 
 fn main() -> skylit::Result<()> {
     let mut arguments = std::env::args().skip(1);
-    let scene = arguments.next().unwrap_or_else(|| "builtin:sky-stairs".to_owned());
+    let scene = arguments.next().unwrap_or_else(|| "builtin:stairs".to_owned());
     let image = arguments.next().unwrap_or_else(|| "custom_pass.png".to_owned());
     let mean = render(&scene, Path::new(&image))?;
     println!("{image}: on average {:.0} % of the day in the sun", 100.0 * mean);

@@ -20,7 +20,7 @@ pub fn render(scene: &str, image: &Path) -> skylit::Result<f64> {
 
 fn main() -> skylit::Result<()> {
     let mut arguments = std::env::args().skip(1);
-    let scene = arguments.next().unwrap_or_else(|| "builtin:sky-stairs".to_owned());
+    let scene = arguments.next().unwrap_or_else(|| "builtin:stairs".to_owned());
     let image = arguments.next().unwrap_or_else(|| "hello_ao.png".to_owned());
     let mean = render(&scene, Path::new(&image))?;
     println!("{image}: on average {:.0} % of the hemisphere is open", 100.0 * mean);

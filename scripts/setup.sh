@@ -5,7 +5,7 @@
 #   ./scripts/setup.sh --check    changes nothing; exit 1 if something is missing
 #
 # On Debian 12 it installs, with apt:
-#   Vulkan loader, validation layer, vulkan-tools    to run and to test
+#   Vulkan loader, validation layer, vulkan-tools    to run and to test; Python to check the documentation
 #   libshaderc-dev, glslang-dev, spirv-tools         the shader compiler that build.rs uses
 #   Xvfb, xdotool, libraries of X11                  to open the viewer's window and to test it; nothing else needs a display
 #   Mesa 25.0 lavapipe from bookworm-backports       all three tracers on the CPU
@@ -23,7 +23,7 @@ die() { printf 'setup: error: %s\n' "$*" >&2; exit 1; }
 needed_elsewhere() {
   cat >&2 <<'TXT'
 setup: this machine is not Debian or Ubuntu. Install these with its own package manager, then run the command again:
-  - a Rust toolchain (stable, 1.88 or newer) and a C++ compiler
+  - a Rust toolchain (stable, 1.88 or newer), a C++ compiler and Python 3
   - shaderc with its static library libshaderc_combined.a, glslang and SPIRV-Tools development files
     (or build with `--features build-shaderc`, which compiles shaderc from source with cmake, ninja, python3 and git)
   - the Vulkan loader (libvulkan.so.1) and VK_LAYER_KHRONOS_validation
@@ -47,7 +47,7 @@ updated=0
 update_once() { [ "$updated" = 1 ] && return 0; say "refreshing the package lists"; apt update >/dev/null; updated=1; }
 
 # --- build and run-time packages -------------------------------------------------------------------------------------
-packages=(g++ pkg-config libvulkan1 vulkan-validationlayers vulkan-tools libshaderc-dev glslang-dev spirv-tools)
+packages=(g++ python3 pkg-config libvulkan1 vulkan-validationlayers vulkan-tools libshaderc-dev glslang-dev spirv-tools)
 # the viewer's window on X11, which is loaded when it opens, and a display without a screen with a hand for its mouse and keys, to test it
 packages+=(libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 xvfb xauth xdotool)
 missing=()

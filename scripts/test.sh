@@ -129,6 +129,8 @@ if cargo fmt --version >/dev/null 2>&1; then
   # modules that macros declare: cargo fmt does not visit them
   rustfmt --edition 2024 --check src/scene/lights/*.rs src/realtime/passes/*.rs
 fi
+say "documents"
+python3 scripts/check_docs.py
 . scripts/linting-compiler.sh
 say "lints of benchmarks and examples"
 cargo build --locked --benches --examples

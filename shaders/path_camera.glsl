@@ -3,10 +3,11 @@
 #include "path/camera.glsl"
 #include "common/frame.glsl"
 
-// Where it has been traced for the G-buffer.
+// Where it has been traced for the G-buffer, or where paths begin at points of surfaces.
 Hit known_hit(uint index) {
     BlockParams p = BlockParams(push.pass);
     if (!in_block(p, block_pixel(p, path_cell(index)))) return miss();
+    if (WITH_SURFACE_POINTS) return hit_of_point(path_point(p, index));
     uvec2 pixel = path_pixel(p, index);
     if (any(greaterThanEqual(pixel, p.image_size))) return miss();
     PathFrameParams f = path_frame_params();

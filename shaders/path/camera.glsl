@@ -16,8 +16,19 @@ Ray lens_ray(BlockParams p, Ray r, vec2 u) {
     return r;
 }
 
+// What a ray straight onto a point of a surface hits.
+Hit hit_of_point(BakePoint point) { return Hit(0.0, point.instance, point.primitive, point.u, point.v); }
+
+// That ray, from the front; none where a pixel has no point.
+Ray ray_onto(BakePoint point) {
+    if (point.instance == INVALID) return no_ray();
+    Surface s = surface_at(no_ray(), hit_of_point(point));
+    return Ray(s.position, 0.0, -s.ng, INFINITY);
+}
+
 Ray camera_sample(BlockParams p, uint index) {
     if (!in_block(p, block_pixel(p, path_cell(index)))) return no_ray();
+    if (WITH_SURFACE_POINTS) return ray_onto(path_point(p, index));
     uvec2 pixel = path_pixel(p, index);
     if (WITH_SIGNAL && any(greaterThanEqual(pixel, p.image_size))) return no_ray();
     vec2 u = sample_2d(p.seed, pixel, path_sample(index), CAMERA_FILM);

@@ -257,7 +257,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         log_side = footprint(cone, s, ray.direction);
     }
     Shading m;
-    if (WITH_CONSTANT_ALBEDO) m = grey_shading(s, towards_viewer, p.albedo);
+    // the light that arrives at a given point is that of a white surface there
+    bool is_given = WITH_SURFACE_POINTS && state.depth + state.passes == 0u;
+    if (WITH_CONSTANT_ALBEDO || is_given) m = grey_shading(s, towards_viewer, WITH_CONSTANT_ALBEDO ? p.albedo : 1.0);
     else m = shade(s, towards_viewer, log_side);
     if (WITH_VIEW) return view_value(p.view, s, m, hit.t + clipped_length(block, ray.direction), log_side);
     vec3 added = vec3(0.0);
@@ -275,7 +277,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     Boundary boundary;
     boundary.medium = state.medium;
     Dispersion dispersion = NO_DISPERSION;
-    bool is_boundary = WITH_MEDIA && is_medium(m.material);
+    bool is_boundary = WITH_MEDIA && !is_given && is_medium(m.material);
     if (WITH_MEDIA && state.depth + state.passes == 0u) store_media(p, k, p.camera_media);
     if (is_boundary) {
         MediaStack stack = p.camera_media;

@@ -7,6 +7,7 @@
 #define PATH_SIGNAL
 #include "path/shading.glsl"
 #include "common/frame.glsl"
+#include "interface/bake.glsl"
 
 // What a vertex is to its path.
 struct SignalVertex {
@@ -18,6 +19,12 @@ struct SignalVertex {
 // Paths beside the one or few that each pixel has in a frame: indices of samples that those do not come to.
 const uint LISTED_SAMPLES = 0x80000000u;
 
+// The point of a surface at which the paths of a pixel begin (WITH_SURFACE_POINTS).
+BakePoint path_point(BlockParams p, uint ray_index) {
+    uvec2 pixel = block_pixel(p, pixel_index(ray_index)) + p.block_origin;
+    return BakePoints(path_frame_params().points).v[pixel.y * p.image_size.x + pixel.x];
+}
+
 // Number of a path's pixel in the block. The pixels beyond the block's are of listed ones.
 uint path_cell(uint ray_index) {
     uint pixel = pixel_index(ray_index);
@@ -27,6 +34,7 @@ uint path_cell(uint ray_index) {
 
 // The index of a path in the sequence of its pixel.
 uint path_sample(uint ray_index) {
+    if (WITH_SURFACE_POINTS) return path_point(BlockParams(push.pass), ray_index).first_sample + sample_index(ray_index);
     PathFrameParams p = path_frame_params();
     if (!WITH_SIGNAL || pixel_index(ray_index) < p.cells) return sample_index(ray_index);
     uint bits = p.listed_bits + push.sample_bits, k = ray_index - (p.cells << push.sample_bits);
@@ -35,6 +43,11 @@ uint path_sample(uint ray_index) {
 
 // The pixel of the image that a path belongs to. Frames in real time count the pixels that are sampled in a frame alone, so that neighbouring rays are of pixels that are close to each other.
 uvec2 path_pixel(BlockParams p, uint ray_index) {
+    if (WITH_SURFACE_POINTS) {
+        // texels have sequences of samples as pixels have
+        uint texel = path_point(p, ray_index).texel;
+        return uvec2(texel & 0xffffu, texel >> 16);
+    }
     uvec2 pixel = block_pixel(p, path_cell(ray_index)) + p.block_origin;
     return WITH_SIGNAL ? sampled_pixel(FrameParams(path_frame_params().frame), pixel) : pixel;
 }

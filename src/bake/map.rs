@@ -5,11 +5,13 @@ use std::collections::BTreeSet;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::frames::{SurfaceFrames, SurfacePoint};
+use super::light::LightTracer;
 use super::plan::PlannedTexture;
 use super::smooth::{FilterTexel, smooth};
 use super::texels::{BAND, Layout, POINTS, TexelPoint};
 use super::trace::{BakePoint, PointSums, PointTracer, Sampling};
 use super::{BakeSettings, Map, Space, backfaces, fill};
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::integrators::rays::{Mode, PreparedRays};
@@ -77,8 +79,8 @@ pub struct Traced<'a> {
     pub scene: &'a Scene,
     /// Tracer of the scene.
     pub tracer: &'a Tracer,
-    /// Origin of the tracer's coordinates.
-    pub origin: DVec3,
+    /// The scene as the tracer has it.
+    pub flat: &'a FlatScene<'a>,
     /// Distance in scene units to both sides of the surfaces in which those of a detailed model
     /// are looked for; `None`: surfaces are their own.
     pub cage: Option<f64>,
@@ -183,6 +185,7 @@ fn background(map: Map, value: Vec3) -> Vec3 {
         Map::Ao | Map::Thickness => Vec3::ONE,
         Map::Curvature => Vec3::splat(0.5),
         Map::BentNormal | Map::Normal => Vec3::Z,
+        Map::Light => Vec3::ZERO,
         Map::Position => value,
     }
 }
@@ -211,6 +214,7 @@ struct Baker<'a> {
     /// Rays out of the surface, and into it.
     outward: Option<PointTracer<'a>>,
     inward: Option<PointTracer<'a>>,
+    light: Option<LightTracer<'a>>,
     sample_bits: u32,
     rays: u64,
 }
@@ -233,6 +237,8 @@ impl<'a> Baker<'a> {
         };
         let is_outward = matches!(settings.map, Map::Ao | Map::BentNormal | Map::Curvature);
         let is_inward = matches!(settings.map, Map::Thickness | Map::Curvature);
+        let has_light = settings.map == Map::Light;
+        let light = has_light.then(|| LightTracer::new(traced.tracer, traced.flat, settings, sample_bits));
         let needs_tangents = settings.map.is_vector() && settings.space == Space::Tangent;
         let tracer = traced.tracer;
         let meshes = traced.cage.map_or(0, |_| traced.scene.meshes.len());
@@ -245,6 +251,7 @@ impl<'a> Baker<'a> {
             detailed: (0..meshes).map(|mesh| SurfaceFrames::of_mesh(traced.scene, mesh)).collect(),
             outward: if is_outward { Some(PointTracer::new(tracer, sampling(false))?) } else { None },
             inward: if is_inward { Some(PointTracer::new(tracer, sampling(true))?) } else { None },
+            light: light.transpose()?,
             sample_bits,
             rays: 0,
         })
@@ -299,17 +306,24 @@ impl<'a> Baker<'a> {
                 self.rays += (records.len() as u64) << self.sample_bits;
             }
         }
+        if let Some(light) = &mut self.light {
+            let before = light.rays;
+            let sums = light.trace(&records, control)?;
+            both.iter_mut().zip(sums).for_each(|(both, sums)| both[0] = sums);
+            self.rays += light.rays - before;
+        }
         Ok(both)
     }
 
     /// For each point whether it is inside of other geometry.
     fn are_hidden(&self, sampled: &[Sampled], sums: &[[PointSums; 2]], control: &mut dyn Control) -> Result<Vec<bool>> {
-        let is_dark = |k: &usize| self.outward.is_some() && sums[*k][0].value == 0.0;
+        let can_tell = self.outward.is_some() || self.light.is_some();
+        let is_dark = |k: &usize| can_tell && sums[*k][0].value == 0.0;
         let dark: Vec<(usize, SurfacePoint)> =
             (0..sampled.len()).filter(is_dark).filter_map(|k| Some((k, self.traced_point(&sampled[k])?))).collect();
         let points: Vec<SurfacePoint> = dark.iter().map(|(_, point)| *point).collect();
-        let Traced { scene, tracer, origin, .. } = self.traced;
-        let inside = backfaces::are_inside(scene, tracer, origin, &points, control)?;
+        let Traced { scene, tracer, flat, .. } = self.traced;
+        let inside = backfaces::are_inside(scene, tracer, flat.origin, &points, control)?;
         let mut is_hidden = vec![false; sampled.len()];
         dark.iter().zip(inside).for_each(|((k, _), inside)| is_hidden[*k] = inside);
         Ok(is_hidden)
@@ -361,7 +375,7 @@ impl<'a> Baker<'a> {
             let Some(surface) = self.surface_point(sample) else { return Ok(Vec::new()) };
             let normal = surface.frame.z_axis;
             rays.push(Ray {
-                origin: (surface.world + cage * normal - self.traced.origin).as_vec3().to_array(),
+                origin: (surface.world + cage * normal - self.traced.flat.origin).as_vec3().to_array(),
                 tmin: 0.0,
                 direction: (-normal).as_vec3().to_array(),
                 tmax: 2.0 * cage as f32,
@@ -404,6 +418,7 @@ impl<'a> Baker<'a> {
             Map::Thickness => scalar(inside.value),
             Map::Curvature => scalar(0.5 * (samples + out.value - inside.value)),
             Map::BentNormal => self.vector(sample, |_| out.direction.as_dvec3()),
+            Map::Light => out.direction,
             Map::Normal => self.vector(sample, |traced| traced.frame.z_axis) * samples,
             Map::Position => self.position(sample) * samples,
         }

@@ -13,6 +13,7 @@ mod backfaces;
 pub mod document;
 pub mod fill;
 mod frames;
+pub mod light;
 pub mod map;
 pub mod pack;
 pub mod picture;
@@ -26,6 +27,7 @@ pub mod vertices;
 
 use std::str::FromStr;
 
+use crate::integrators::IntegratorName;
 use crate::integrators::ao::Occlusion;
 use crate::settings::choices;
 
@@ -44,13 +46,20 @@ choices! {
         Position = "position",
         /// Shading normal, as RGB
         Normal = "normal",
+        /// Light that arrives, as RGB: irradiance divided by pi (a light map)
+        Light = "light",
     }
 }
 
 impl Map {
-    /// Returns true if its values are directions or positions, else one number.
+    /// Returns true if its values are directions or positions.
     pub fn is_vector(self) -> bool {
         matches!(self, Map::BentNormal | Map::Position | Map::Normal)
+    }
+
+    /// Returns true if it has three channels, else one.
+    pub fn is_rgb(self) -> bool {
+        self.is_vector() || self == Map::Light
     }
 
     /// Returns true if rays sample it.
@@ -127,6 +136,15 @@ impl FromStr for TexcoordChoice {
     }
 }
 
+/// The light that arrives at surfaces.
+#[derive(Clone, Debug, Default)]
+pub struct LightSettings {
+    /// The integrator, one of paths without ambient occlusion; `None`: `path`.
+    pub integrator: Option<IntegratorName>,
+    /// Maximum number of bounces; 1 is direct light. `None`: the scene's, or no limit.
+    pub max_depth: Option<u32>,
+}
+
 /// Settings of baking.
 #[derive(Clone, Debug)]
 pub struct BakeSettings {
@@ -159,6 +177,8 @@ pub struct BakeSettings {
     pub averages_instances: bool,
     /// Names of the materials that are baked; none: all.
     pub materials: Vec<String>,
+    /// The light of [`Map::Light`].
+    pub light: LightSettings,
 }
 
 impl Default for BakeSettings {
@@ -178,6 +198,7 @@ impl Default for BakeSettings {
             space: Space::default(),
             averages_instances: false,
             materials: Vec::new(),
+            light: LightSettings::default(),
         }
     }
 }

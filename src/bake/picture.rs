@@ -1,4 +1,5 @@
-//! Baked maps as image files: linear values, since a texture of data is no colour.
+//! Baked maps as image files: linear values, since a texture of data is no colour; light alone is,
+//! and has the values of sRGB in files of integers.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -8,6 +9,7 @@ use image::{ExtendedColorType, ImageFormat as Format};
 
 use super::map::BakedMap;
 use super::{BakeSettings, Map};
+use crate::colour::srgb_encode;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::output::{self, Channel, Image};
@@ -23,11 +25,12 @@ pub enum Bits {
 }
 
 /// Values of a map from 0 to 1, as integers hold them: directions by (d + 1) / 2, positions within
-/// their bounds.
+/// their bounds, light as sRGB up to 1.
 fn unit_values(map: &BakedMap, settings: &BakeSettings) -> Vec<Vec3> {
     let (low, high) = map.bounds;
     let unit = |value: &Vec3| match settings.map {
         Map::BentNormal | Map::Normal => 0.5 * *value + 0.5,
+        Map::Light => value.map(srgb_encode),
         Map::Position => (*value - low) / (high - low).max(Vec3::splat(f32::MIN_POSITIVE)),
         _ => *value,
     };
@@ -39,7 +42,7 @@ fn unit_values(map: &BakedMap, settings: &BakeSettings) -> Vec<Vec3> {
 /// # Errors
 /// [`Error::Usage`] with the encoder's message.
 pub fn png(map: &BakedMap, settings: &BakeSettings, bits: Bits) -> Result<Vec<u8>> {
-    let channels = if settings.map.is_vector() { 3 } else { 1 };
+    let channels = if settings.map.is_rgb() { 3 } else { 1 };
     let values = unit_values(map, settings);
     let components = values.iter().flat_map(|v| v.to_array().into_iter().take(channels));
     let (bytes, colour): (Vec<u8>, _) = match (bits, channels) {
@@ -80,7 +83,7 @@ pub fn save(map: &BakedMap, settings: &BakeSettings, bits: Bits, path: &Path) ->
         return files::write_atomically(path, |file| std::io::Write::write_all(file, &png));
     }
     let plane = |k: usize| map.values.iter().map(|v| v[k]).collect();
-    let channels = if settings.map.is_vector() {
+    let channels = if settings.map.is_rgb() {
         ["R", "G", "B"].iter().enumerate().map(|(k, name)| Channel::from_floats(*name, plane(k))).collect()
     } else {
         vec![Channel::from_floats("Y", plane(0))]

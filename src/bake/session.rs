@@ -8,7 +8,8 @@ use glam::DVec3;
 use super::map::{self, BakedMap, Traced};
 use super::plan::{PlannedTexture, meshes_by_material};
 use super::vertices::{self, BakedVertices};
-use super::{BakeSettings, Occluders};
+use super::{BakeSettings, Map, Occluders};
+use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
@@ -16,7 +17,7 @@ use crate::gpu::Device;
 use crate::integrators::ao::Hemisphere;
 use crate::scene::builtin::shapes;
 use crate::scene::load::SourceFile;
-use crate::scene::{Instance, Mesh, Scene};
+use crate::scene::{Instance, Mesh, Motion, Scene};
 use crate::tracer::{DeviceSettings, Needs, Tracer};
 
 /// Side of the ground plane, in diagonals of the scene.
@@ -46,8 +47,8 @@ impl BakeSession<'_> {
         let mut maps = Vec::new();
         let groups = planned.iter().map(|t| t.surfaces.iter().map(|s| s.mesh).collect()).collect::<Vec<Vec<usize>>>();
         let share = u64::from(self.settings.spp) << 20;
-        self.with_each(&groups, share, control, |scene, tracer, origin, nth, control| {
-            let traced = Traced { scene, tracer, origin, cage: self.detailed.map(|(_, cage)| cage) };
+        self.with_each(&groups, share, control, |flat, tracer, nth, control| {
+            let traced = Traced { scene: flat.scene, tracer, flat, cage: self.detailed.map(|(_, cage)| cage) };
             maps.push(map::bake(self.scene, traced, &planned[nth], self.settings, control)?);
             Ok(())
         })?;
@@ -68,9 +69,11 @@ impl BakeSession<'_> {
         let groups: Vec<Vec<usize>> =
             meshes_by_material(self.scene).into_iter().map(|(_, meshes)| meshes).filter(named).collect();
         let share = u64::from(self.settings.spp) << 16;
-        self.with_each(&groups, share, control, |scene, tracer, _, nth, control| {
+        self.with_each(&groups, share, control, |flat, tracer, nth, control| {
             for &mesh in &groups[nth] {
-                if let Some((vertices, traced)) = vertices::bake(scene, tracer, file, mesh, self.settings, control)? {
+                if let Some((vertices, traced)) =
+                    vertices::bake(flat.scene, tracer, file, mesh, self.settings, control)?
+                {
                     baked.push(vertices);
                     rays += traced;
                 }
@@ -80,27 +83,34 @@ impl BakeSession<'_> {
         Ok((baked, rays))
     }
 
-    /// Calls `bake` for each group of meshes with the scene that occludes it, its tracer and
-    /// origin. `rays`: about how many each will trace.
+    /// Calls `bake` for each group of meshes with the scene that occludes it, and its tracer.
+    /// `rays`: about how many each will trace.
     fn with_each(
         &self,
         groups: &[Vec<usize>],
         rays: u64,
         control: &mut dyn Control,
-        mut bake: impl FnMut(&Scene, &Tracer, DVec3, usize, &mut dyn Control) -> Result<()>,
+        mut bake: impl FnMut(&FlatScene, &Tracer, usize, &mut dyn Control) -> Result<()>,
     ) -> Result<()> {
         let total = groups.len() as u64;
         let mut run = |scene: &Scene, numbers: std::ops::Range<usize>, control: &mut dyn Control| {
-            let flat = FlatScene::new(scene);
-            let needs =
+            let of_occlusion =
                 Needs { normals: self.settings.occlusion.hemisphere == Hemisphere::Shading, ..Needs::default() };
+            let (flat, needs) = match self.settings.map {
+                // some rays pass what is partly transparent
+                Map::Light => {
+                    let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), Blend::Stochastic)?;
+                    (flat, self.settings.light.needs()?)
+                }
+                _ => (FlatScene::new(scene), of_occlusion),
+            };
             let (kind, _, compute) = self.tracing.choose(&self.device.info)?;
             let build = self.tracing.build_options(rays * numbers.len() as u64);
             let tracer = Tracer::with_build(self.device, kind, &flat, needs, compute, &build)?;
             build.take_warnings().iter().for_each(|w| control.warning(w));
             for number in numbers {
                 let mut part = Part { control: &mut *control, done: number as u64, total };
-                bake(scene, &tracer, flat.origin, number, &mut part)?;
+                bake(&flat, &tracer, number, &mut part)?;
             }
             Ok(())
         };

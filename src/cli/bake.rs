@@ -13,11 +13,15 @@ use crate::bake::map::BakedMap;
 use crate::bake::picture::{self, Bits};
 use crate::bake::plan::{PlannedTexture, plan};
 use crate::bake::session::BakeSession;
-use crate::bake::{BakeSettings, Map, Occluders, Space, Target, TexcoordChoice, agreement, document, pack};
+use crate::bake::{
+    BakeSettings, LightSettings, Map, Occluders, Space, Target, TexcoordChoice, agreement, document, pack,
+};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
+use crate::integrators::IntegratorName;
 use crate::integrators::ao::{Hemisphere, Occlusion};
+use crate::integrators::lighting::LightingSettings;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::export::{AmendedFile, export_gltf};
 use crate::scene::load::{LoadOptions, load_with};
@@ -35,7 +39,8 @@ const EXAMPLES: &str = "Examples:
   skylit bake model.glb -o model-vc.glb --to vertices          colours of vertices instead
   skylit bake model.glb -o bent.png --map bent-normal --space tangent --size 2048
   skylit bake low.glb -o normals.png --from high.glb --map normal --space tangent
-  skylit bake model.obj -o thickness.exr --map thickness --ao-radius 10%";
+  skylit bake model.obj -o thickness.exr --map thickness --ao-radius 10%
+  skylit bake room.glb -o light.exr --map light --environment sky --denoise";
 
 /// Largest width and height of a texture.
 const MAX_SIZE: u32 = 16384;
@@ -67,6 +72,12 @@ pub struct BakeArgs {
     /// More samples for texels whose standard error is larger, 64 times --spp at most
     #[arg(long, value_name = "ERROR", value_parser = parse_error)]
     pub target_error: Option<f64>,
+    /// Integrator of --map light: path, direct, whitted or ao-sky [default: path]
+    #[arg(long, value_name = "NAME", value_parser = str::parse::<IntegratorName>)]
+    pub integrator: Option<IntegratorName>,
+    /// Maximum path length of --map light in bounces: 1 is direct light [default: the scene's, or no limit]
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
@@ -118,6 +129,9 @@ pub struct BakeArgs {
     /// Render the written model with its baked and with traced ambient occlusion, and report how far apart they are
     #[arg(long)]
     pub verify: bool,
+    /// Light of --map light
+    #[command(flatten)]
+    pub lighting: LightingSettings,
     /// Files of the scene
     #[command(flatten)]
     pub load: LoadArgs,
@@ -179,6 +193,8 @@ fn check(args: &BakeArgs) -> Result<Output> {
     // options that do not go together, and the remedy
     let (is_image, to_vertices) = (output == Output::Image, args.to == Target::Vertices);
     let is_packed = args.pack.is_some();
+    let is_light = args.map == Map::Light;
+    let has_path_options = args.integrator.is_some() || args.max_depth.is_some();
     let refusals = [
         (
             !is_image && args.map != Map::Ao,
@@ -191,8 +207,17 @@ fn check(args: &BakeArgs) -> Result<Output> {
         ),
         (matches!(args.cage, Some(Length::Auto)), "--cage: a length or a share is expected"),
         (
-            args.target_error.is_some() && (to_vertices || !args.map.is_sampled()),
-            "--target-error is for textures of what is sampled",
+            args.target_error.is_some() && (to_vertices || !args.map.is_sampled() || is_light),
+            "--target-error is for textures of what rays sample, but for light",
+        ),
+        (
+            is_light
+                && (args.ao_radius.is_some() || args.ao_falloff.is_some() || args.ao_normal != Hemisphere::default()),
+            "--ao-radius, --ao-falloff and --ao-normal have no effect on --map light",
+        ),
+        (
+            !is_light && (args.lighting != LightingSettings::default() || has_path_options),
+            "--environment, --light, --integrator and --max-depth are for --map light",
         ),
         (args.denoise && to_vertices, "--denoise is for textures: vertices are the means of their triangles"),
         (is_packed && (is_image || to_vertices), "--pack orm is for textures of a model"),
@@ -227,7 +252,7 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     let mut warnings = Warnings::new(console);
     renderer.scene().report.all_warnings().iter().for_each(|w| warnings.add(w));
     files_plan.check_scene(&renderer.scene().report.files)?;
-    let (settings, remarks) = settings(args, &mut renderer)?;
+    let (settings, remarks, lighting) = settings(args, &mut renderer)?;
     let device = renderer.device().clone();
     let mut scene = renderer.into_scene();
     let model = ModelFile::open(args, output, &mut scene)?;
@@ -251,6 +276,8 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     for line in remarks.iter().chain(planned.iter().flat_map(|t| &t.remarks)) {
         console.line(line)?;
     }
+    // lights may be meshes, which have no textures
+    lighting.apply(&mut scene)?;
     let unpacked = planned.iter().filter(|_| args.pack.is_some()).filter_map(|t| pack::partner(&scene, t).err());
     unpacked.for_each(|reason| warnings.add(&reason));
 
@@ -272,6 +299,10 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         "scene": args.scene, "map": args.map.name(), "to": args.to.name(),
         "ao_radius": settings.occlusion.radius, "spp": settings.spp,
     });
+    if args.map == Map::Light {
+        record["integrator"] = json!(settings.light.integrator()?.name());
+        record["max_depth"] = json!(args.max_depth);
+    }
     let (written, what, rays) = bake_and_write(args, &session, model, planned, paths, &mut record, &mut control)?;
     drop(control);
     device.check_validation()?;
@@ -376,16 +407,34 @@ impl ModelFile {
     }
 }
 
-/// The settings of baking, with a radius in scene units, and sentences on what was chosen.
-fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>)> {
+/// The settings of baking, with a radius in scene units, sentences on what was chosen, and the light
+/// besides the scene's.
+fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>, LightingSettings)> {
     renderer.apply_scene_settings(&args.meaning)?;
     let bounds = renderer.scene().bounds();
     let diagonal = bounds.map_or(1.0, |(low, high)| (high - low).length());
     let mut remarks = Vec::new();
 
+    // a light map has the light of a render
+    let light = LightSettings { integrator: args.integrator, max_depth: args.max_depth };
+    let mut lighting = args.lighting.clone();
+    if args.map == Map::Light {
+        let (scene, integrator) = (args.meaning.clone(), Some(light.integrator()?));
+        let mut settings =
+            RenderSettings { scene, integrator, lighting: lighting.clone(), ..RenderSettings::default() };
+        settings.integrators.path.max_depth = args.max_depth;
+        settings.check()?;
+        let completed = renderer.complete(&settings, None)?;
+        remarks.extend(completed.choices.into_iter().filter(|line| line.starts_with("light")));
+        if completed.chosen.lighting != LightingSettings::default() {
+            lighting = completed.chosen.lighting;
+        }
+    }
+
     // the radius of ambient occlusion is chosen as that of a render
     let own = args.map.default_radius().map(Length::OfDiagonal);
-    let wanted = args.ao_radius.or(own);
+    let unlimited = (args.map == Map::Light).then_some(Length::Units(f64::INFINITY));
+    let wanted = args.ao_radius.or(own).or(unlimited);
     let radius = match wanted.and_then(|length| length.units(diagonal)) {
         Some(units) => units,
         None => {
@@ -414,11 +463,12 @@ fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, V
         space: args.space,
         averages_instances: args.average_instances,
         materials: args.only_material.clone(),
+        light,
     };
     if renderer.scene().rig.is_some() {
         remarks.push("the scene is animated: its rest pose is baked".to_owned());
     }
-    Ok((settings, remarks))
+    Ok((settings, remarks, lighting))
 }
 
 /// The distance from surfaces within which those of a detailed model are looked for, scene units.

@@ -48,6 +48,7 @@ feature_set! {
     Ambient = "WITH_AMBIENT", "ambient light";
     BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
     OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
+    SurfacePoints = "WITH_SURFACE_POINTS", "paths that begin at given points of surfaces";
     Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";
     MinDepth = "WITH_MIN_DEPTH", "minimum depth";
     Clamp = "WITH_CLAMP", "radiance clamp";

@@ -532,10 +532,14 @@ impl App {
                             // be black
                             chosen => openness.and_then(|o| o.limit(chosen.is_some())),
                         };
-                        let is_chosen = !matches!(ao.ao_radius, Some(Length::Units(_)));
+                        let reason = match ao.ao_radius {
+                            Some(Length::Units(_)) => None,
+                            Some(share @ Length::OfDiagonal(_)) => Some(format!("{share} of the scene's diagonal")),
+                            _ => Some("by what the camera sees".to_owned()),
+                        };
                         ao.ao_radius = radius.map(Length::Units);
-                        if let (true, Some(radius)) = (is_chosen, radius) {
-                            self.report(format!("AO radius {radius}, by what the camera sees"), false);
+                        if let Some((reason, radius)) = reason.zip(radius) {
+                            self.report(format!("AO radius {radius}, {reason}"), false);
                         }
                         self.control = Some(control);
                     }

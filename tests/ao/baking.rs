@@ -7,13 +7,14 @@ use skylit::bake::map::BakedMap;
 use skylit::bake::plan::{PlannedTexture, plan};
 use skylit::bake::session::BakeSession;
 use skylit::bake::texels::{Layout, TexelPoint};
-use skylit::bake::{BakeSettings, Map, Occluders, Space};
+use skylit::bake::{BakeSettings, LightSettings, Map, Occluders, Space};
 use skylit::film::NoControl;
 use skylit::gpu::Device;
 use skylit::integrators::ao::Occlusion;
 use skylit::oracle::closed_form as exact;
 use skylit::scene::builtin::shapes;
-use skylit::scene::{Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh};
+use skylit::scene::material::MaterialKind;
+use skylit::scene::{Environment, Geometry, Instance, Light, LightKind, Material, Mesh, Scene, Sphere, TriangleMesh};
 use skylit::tracer::{DeviceSettings, TracerChoice, TracerKind};
 
 use crate::common::{assert_validation_clean, device, picked};
@@ -180,6 +181,63 @@ fn gpu_bake_fills_what_is_inside_of_others() {
             assert!(map.values.iter().all(|v| v.x == 1.0) && map.hidden == 0, "{kind}");
         }
     }
+}
+
+/// Light maps against irradiance divided by pi: of a white sky, of a directional light, and within a furnace.
+#[test]
+fn gpu_bake_light() {
+    let device = device();
+    let light_map = |integrator: &str| BakeSettings {
+        map: Map::Light,
+        light: LightSettings { integrator: Some(integrator.parse().unwrap()), max_depth: None },
+        ..settings(16, 64)
+    };
+    let floor = || Geometry::Triangles(rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z));
+    for kind in picked(&device) {
+        // an open floor under a white sky, whatever its material
+        let mut scene = scene_of(vec![floor()]);
+        scene.materials[0].base_color = [0.1, 0.2, 0.3, 1.0].into();
+        scene.materials[0].emissive = Vec3::splat(5.0);
+        scene.environment = Environment::Uniform(Vec3::ONE);
+        for integrator in ["path", "direct", "ao-sky"] {
+            let (_, map) = bake(&device, kind, &scene, light_map(integrator));
+            let [bias, rmse] = differences(&map, |_| 1.0);
+            println!("{integrator} on {}: bias {bias:e}, RMSE {rmse:e}", kind.name());
+            assert!(bias.abs() < 1e-5 && rmse < 1e-4, "{integrator}: {bias} {rmse}");
+        }
+
+        // a distant light has no noise
+        scene.environment = Environment::Black;
+        scene.lights.push(Light {
+            name: String::new(),
+            kind: LightKind::Directional { angle: 0.0 },
+            position: DVec3::ZERO,
+            direction: DVec3::new(0.6, -0.8, 0.0),
+            intensity: Vec3::new(1.0, 2.0, 3.0),
+            range: f64::INFINITY,
+        });
+        let (_, map) = bake(&device, kind, &scene, light_map("direct"));
+        let exact = 0.8 / std::f64::consts::PI * DVec3::new(1.0, 2.0, 3.0);
+        let worst = map.values.iter().map(|v| (v.as_dvec3() - exact).length()).fold(0.0, f64::max);
+        assert!(worst < 1e-5, "{worst}");
+
+        // a closed box of albedo one half whose walls emit one: two arrives everywhere
+        let walls = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z].map(|outward| {
+            let along = if outward.x == 0.0 { Vec3::X } else { Vec3::Y };
+            // the front is within
+            Geometry::Triangles(rectangle(outward, along, (-outward).cross(along)))
+        });
+        let mut scene = scene_of(walls.into());
+        for material in &mut scene.materials {
+            material.kind = MaterialKind::Matte;
+            (material.base_color, material.emissive) = ([0.5, 0.5, 0.5, 1.0].into(), Vec3::ONE);
+        }
+        let (_, map) = bake(&device, kind, &scene, light_map("path"));
+        let [bias, rmse] = differences(&map, |_| 2.0);
+        println!("furnace on {}: bias {bias:e}, RMSE {rmse:e}, estimated {:e}", kind.name(), map.error);
+        assert!(bias.abs() < 0.02 && rmse < 2.0 * map.error.max(0.02), "{bias} {rmse}");
+    }
+    assert_validation_clean(&device);
 }
 
 #[test]

@@ -40,7 +40,13 @@ impl Schedule {
     /// # Errors
     /// [`Error::Usage`] where the megakernel is asked for and cannot be used.
     pub(super) fn choose(kernel: PathKernel, tracer: &Tracer, features: PathFeatures) -> Result<Self> {
-        let queued = [PathFeature::Signal, PathFeature::ClearWalls, PathFeature::Ambient, PathFeature::View];
+        let queued = [
+            PathFeature::Signal,
+            PathFeature::SurfacePoints,
+            PathFeature::ClearWalls,
+            PathFeature::Ambient,
+            PathFeature::View,
+        ];
         let schedule = match tracer.few_leaves() {
             _ if kernel == PathKernel::Wavefront => Self::Wavefront,
             _ if !tracer.can_trace_in_passes() => Self::CannotTrace,
@@ -64,7 +70,8 @@ impl Schedule {
                 "the megakernel needs a CPU driver of Mesa 23 or later, --tracer compute and --traversal auto".into()
             }
             Self::NeedsQueues => {
-                "thin walls that light passes straight, ambient light and views of surfaces need queues of rays".into()
+                "thin walls that light passes straight, ambient light, light maps and views of surfaces need queues of rays"
+                    .into()
             }
             Self::Large => {
                 format!("the megakernel is for static scenes without instances, of at most {MAX_LEAVES} leaves")

@@ -19,6 +19,7 @@ mod lights;
 mod media;
 mod megakernel;
 mod params;
+pub mod points;
 mod report;
 pub mod settings;
 pub mod signal;
@@ -361,13 +362,14 @@ impl PathEstimator {
 
         // Pipelines.
         let shares_camera_rays = !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens);
-        let traced_by = TracedBy::new(tracer, &constants, has_signal && shares_camera_rays, schedule)?;
+        let has_known_hits = has_signal && shares_camera_rays || options.begins_at_points;
+        let traced_by = TracedBy::new(tracer, &constants, has_known_hits, schedule)?;
 
         Ok(Self {
             traced_by,
             resolve: shaders::PATH_RESOLVE.pipeline(device)?,
             schedule,
-            begins_at_known: false,
+            begins_at_known: options.begins_at_points,
             buffers,
             params: upload_params(device, &records)?,
             records,

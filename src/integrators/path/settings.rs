@@ -162,6 +162,8 @@ pub struct PathOptions {
     pub background_only: bool,
     /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
     pub view: Option<View>,
+    /// Paths begin at given points of surfaces, not at the camera ([`super::points`]).
+    pub begins_at_points: bool,
     /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
     pub texture_filter: TextureFilter,
     /// Thin lens of a perspective camera; `None`: a pinhole.
@@ -189,6 +191,7 @@ impl Default for PathOptions {
             ambient: None,
             background_only: false,
             view: None,
+            begins_at_points: false,
             texture_filter: TextureFilter::Bilinear,
             lens: None,
             min_depth: 0,
@@ -245,6 +248,8 @@ impl PathOptions {
             ambient,
             background_only,
             view,
+            // no image of a camera
+            begins_at_points: _,
             specular_only: _,
             texture_filter,
             lens,
@@ -383,6 +388,7 @@ impl PathOptions {
             (PathFeature::OccludedLight, self.occludes_all()),
             (PathFeature::BackgroundOnly, self.background_only),
             (PathFeature::View, self.view.is_some()),
+            (PathFeature::SurfacePoints, self.begins_at_points),
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
             (PathFeature::PixelFilter, self.samples.pixel_filter != PixelFilter::Box),
         ]);

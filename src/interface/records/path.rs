@@ -155,6 +155,9 @@ records! {
         /// A `KnownHit` per pixel of the image (`path_surface`), or 0: paths trace their camera
         /// rays themselves.
         known_hits: address,
+        /// A `BakePoint` per pixel, where paths begin at points of surfaces
+        /// (`WITH_SURFACE_POINTS`).
+        points: address,
         /// Listed ones among the pixels that are sampled in the frame (`SurfacesParams.list`).
         listed: address,
         /// Number of pixels that are sampled in the frame. Rays of pixels beyond are of listed

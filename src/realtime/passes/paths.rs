@@ -87,6 +87,7 @@ impl Pass for Paths {
         let of_frame = PathFrameParams {
             frame: frame.params,
             known_hits: if begins_at_known { resources.address(Resource::KnownHits) } else { 0 },
+            points: 0,
             listed: self.uncovered.as_ref().map_or(0, |(u, _)| u.address()),
             cells: self.sampled.rays(),
             listed_bits: 0,
