@@ -71,6 +71,8 @@ pub fn layer(image: &Image, name: &str) -> Result<(Image, Vec<String>), String> 
 pub fn default_range(layer: &Image, old_names: &[String]) -> Option<[f32; 2]> {
     match old_names {
         [name, _, _] if ["Ng", "Ns", "bent"].contains(&layer_of(name)) => Some([-1.0, 1.0]),
+        // the largest integer is the number of no object
+        [name] if layer_of(name) == "id" => Some(extremes_below(layer, u32::MAX as f32)),
         [name] if name != "A" && !COLOURS.contains(&&**name) => Some(extremes(layer)),
         _ => None,
     }
@@ -79,11 +81,16 @@ pub fn default_range(layer: &Image, old_names: &[String]) -> Option<[f32; 2]> {
 /// The least and the greatest finite value of the colours, of covered pixels where there are some.
 /// They differ.
 pub fn extremes(image: &Image) -> [f32; 2] {
+    extremes_below(image, f32::INFINITY)
+}
+
+/// The same of values below `limit`.
+fn extremes_below(image: &Image, limit: f32) -> [f32; 2] {
     let alpha = image.f32("A").filter(|alpha| alpha.iter().any(|a| *a > 0.0));
     let mut found = [f32::INFINITY, f32::NEG_INFINITY];
     for values in COLOURS.into_iter().filter_map(|name| image.f32(name)) {
         for (k, value) in values.iter().enumerate() {
-            if value.is_finite() && alpha.is_none_or(|alpha| alpha[k] > 0.0) {
+            if value.is_finite() && *value < limit && alpha.is_none_or(|alpha| alpha[k] > 0.0) {
                 found = [found[0].min(*value), found[1].max(*value)];
             }
         }

@@ -123,6 +123,26 @@ fn a_model_gets_coordinates_and_a_texture_and_keeps_the_rest() {
     let verify = &record["verify"];
     assert!(verify["pixels"].as_u64().unwrap() > 10_000, "{verify}");
     assert!(verify["rmse"].as_f64().unwrap() < 0.03 && verify["bias"].as_f64().unwrap().abs() < 0.004, "{verify}");
+
+    // pictures of what is baked have the values of its .exr
+    let [exr, png] = ["seen.exr", "seen.png"].map(|name| place(&dir, name));
+    let seen = run(&[
+        "render",
+        &glb,
+        "-o",
+        &exr,
+        "-o",
+        &png,
+        "--integrator",
+        "baked-occlusion",
+        "--size",
+        "48x32",
+        "--spp",
+        "4",
+    ]);
+    assert!(seen.status.success());
+    let record = json(&run(&["diff", &exr, &png, "--json"]));
+    assert!(record["rmse"].as_f64().unwrap() < 0.004, "{record}");
 }
 
 #[test]

@@ -107,6 +107,11 @@ fn layers_are_images_of_their_own() {
     converts(&[&image, &exr, "--layer", "depth.Z", "--range", "31,7"]);
     assert_eq!(values(&exr, "Y")[31], 0.0);
 
+    // the number of no object is none of the numbers
+    let ids = write(&dir, "ids.exr", &[("id.instance", &|k| if k == 0 { u32::MAX as f32 } else { k as f32 })], &[]);
+    let text = converts(&[&ids, &png, "--layer", "id.instance"]);
+    assert!(text.lines().next().unwrap().contains("1 to 31 as 0 to 1"), "{text}");
+
     // directions by their components in order, colours as they are
     let record = json(&run(&["convert", &image, &png, "--layer", "Ng", "--json", "--png-encoding", "linear"]));
     assert_eq!(record["channels"], serde_json::json!(["Ng.X", "Ng.Y", "Ng.Z"]));

@@ -269,7 +269,8 @@ impl Integrator for PathVariant {
         Ok(Rendered { image: result.image, report, ..Default::default() })
     }
 
-    /// Tone maps radiance, maps normals from -1..1 to 0..1, divides depths by their maximum.
+    /// Tone maps radiance, maps normals from -1..1 to 0..1, divides depths by their maximum; what is
+    /// baked is shown as what is traced.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image {
         let shown = |f: &dyn Fn(f32) -> f32| {
             let mut out = image.clone();
@@ -288,7 +289,8 @@ impl Integrator for PathVariant {
                     image.f32("R").map_or(0.0, |d| d.iter().copied().fold(0.0, f32::max)).max(f32::MIN_POSITIVE);
                 shown(&|d| d / greatest)
             }
-            Some(View::BakedOcclusion) => shown(&|o| o),
+            // as ambient visibility that is traced
+            Some(View::BakedOcclusion) => image.clone(),
             Some(View::Albedo) | None => options.tone_map.apply(image, options.exposure),
         }
     }
