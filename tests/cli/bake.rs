@@ -142,7 +142,7 @@ fn a_model_gets_coordinates_and_a_texture_and_keeps_the_rest() {
     ]);
     assert!(seen.status.success());
     let record = json(&run(&["diff", &exr, &png, "--json"]));
-    assert!(record["rmse"].as_f64().unwrap() < 0.004, "{record}");
+    assert!(record["compared"]["rmse"].as_f64().unwrap() < 0.004, "{record}");
 }
 
 #[test]
