@@ -60,6 +60,18 @@ METALS = [
     ["--material", "0 base_color=0.95,0.64,0.54 metallic=1 roughness=0.3", "--environment", "softbox", "--tone-map", "neutral"],
     ["--material", "0 base_color=0.91,0.92,0.92 metallic=1 roughness=0.1", "--environment", "sky", "--tone-map", "agx"],
 ]
+STAIRS_LIT = ["--integrator", "path", "--environment", "0.06,0.07,0.09", "--size", "240x180", "--spp", "64", "--denoise", "--tone-map", "agx"]
+# lights of the guide, from the left, above first
+LIGHTS = [
+    "sun direction=1,-0.9,-0.7 irradiance=3",
+    "sun direction=1,-0.9,-0.7 irradiance=3 angle=20",
+    "point position=0,2.5,2 intensity=10",
+    "spot position=-1,4,3 direction=0.2,-1,-0.8 intensity=40 outer=20 inner=12",
+    "rectangle position=-3,3,3 direction=1,-0.8,-0.9 size=1.5,1.5 radiance=12 temperature=3000",
+    "led position=0,4,1 direction=0,-1,0 intensity=20 half_angle=35 temperature=6500",
+]
+SPHERE = ["--only", "1", "--integrator", "path", "--environment", "studio", "--eye", "0,1.5,4", "--target", "0,1.5,0", "--fov-y", "40", "--size", "180x180"]
+ORBIT = ["--ao-radius", "10%", "--orbit", "480", "--frames", "0..24", "--size", "320x240", "--fov-y", "40"]
 # models that are not part of the project: name of the file, and where it lies in the folder of --scenes
 MODELS = {
     "sponza.glb": "sponza/sponza.glb",
@@ -420,6 +432,86 @@ def resuming(studio: Studio) -> None:
     studio.save("resuming.jpg", beside(read(image), read(samples)), 92)
 
 
+# ---- the guide ----
+
+
+def guide_install(studio: Studio) -> None:
+    """The image that shows that the program works."""
+    studio.save("guide-install.png", studio.render("builtin:stairs", "--size", "480x270", "--denoise"))
+
+
+def guide_first(studio: Studio) -> None:
+    """The first image: noisy, with a radius and denoised, and path traced."""
+    view = ["builtin:atrium", "--size", "480x270"]
+    studio.save("guide-first-noisy.png", studio.render(*view))
+    studio.save("guide-first-ao.png", studio.render(*view, "--ao-radius", "10%", "--spp", "64", "--denoise"))
+    path = ["--integrator", "path", "--environment", "sky:60,240", "--spp", "128", "--denoise", "--tone-map", "agx", "--exposure", "0.7"]
+    studio.save("guide-first-path.jpg", studio.render(*view, *path), 92)
+
+
+def guide_environments(studio: Studio) -> None:
+    """FlightHelmet in six environments."""
+    view = ["FlightHelmet.gltf", "--integrator", "path", "--size", "320x320", "--spp", "48", "--denoise", "--tone-map", "agx"]
+    images = [studio.render(*view, "--environment", e) for e in ("studio", "softbox", "overcast", "sky:60,120")]
+    images.append(studio.render(*view, "--environment", "sky:4,250,3", "--exposure", "3"))
+    images.append(studio.render(*view, "--environment", "1,1,1"))
+    studio.save("guide-environments.jpg", sheet([images[:3], images[3:]]), 92)
+
+
+def guide_lights(studio: Studio) -> None:
+    """The stairs under six kinds of light."""
+    images = [studio.render("builtin:stairs", *STAIRS_LIT, "--light", light) for light in LIGHTS]
+    studio.save("guide-lights.jpg", sheet([images[:3], images[3:]]), 92)
+
+
+def guide_roughness(studio: Studio) -> None:
+    """A sphere of five values of roughness, as a dielectric and as a metal."""
+    view = ["builtin:sphere-over-plane", *SPHERE, "--spp", "64", "--denoise", "--tone-map", "neutral"]
+    values = [[f"0 base_color=0.9,0.35,0.08 metallic={m} roughness={r}" for r in (0, 0.25, 0.5, 0.75, 1)] for m in (0, 1)]
+    studio.save("guide-roughness.png", sheet([[studio.render(*view, "--material", value) for value in row] for row in values]))
+
+
+def guide_presets(studio: Studio) -> None:
+    """Part of a frame in motion: the rays of one frame alone, and three presets."""
+    alone = ["--preset", "fast", "--history", "1", "--filter", "none", "--antialias", "off"]
+    rows = [alone, *(["--preset", preset] for preset in ("fast", "balanced", "quality"))]
+    images = [studio.render("builtin:atrium", *ORBIT, *options) for options in rows]
+    studio.save("guide-presets.png", beside(*(enlarged(cut(image, 0, 90, 150, 112), 2) for image in images)))
+
+
+def guide_parade(studio: Studio) -> None:
+    """Four moments of an animation, path traced in real time."""
+    view = ["--integrator", "path", "--preset", "balanced", "--environment", "sky:40,120", "--size", "320x180", "--tone-map", "agx"]
+    images = [studio.render("builtin:parade", "--animate", "--fps", "24", "--frames", f"0..{n + 1}", *view) for n in (0, 12, 24, 36)]
+    studio.save("guide-parade.jpg", beside(*images), 92)
+
+
+def guide_turn(studio: Studio) -> None:
+    """FlightHelmet, which turns once around: an animated PNG."""
+    file = studio.path(".apng")
+    options = ["--preset", "quality", "--rays-per-pixel", "16", "--orbit", "32", "--frames", "0..32", "--lead-in", "8", "--fps", "8"]
+    studio.run("render", "FlightHelmet.gltf", *options, "--size", "160x160", "--no-config", "-o", file, "--quiet")
+    shutil.copy(file, FOLDER / "guide-turn.png")
+
+
+def guide_viewer_list(studio: Studio) -> None:
+    """The viewer in its dark theme, with the list of what can be seen."""
+    script = ["wait picture", "wait 75", "click Show", "wait 3"]
+    script.append(f"screenshot {(file := studio.path('.png'))}")
+    studio.view("\n".join(script) + "\n", "builtin:atrium", "--size", "1160x640", "--preset", "balanced", "--ao-radius", "10%")
+    studio.save("guide-viewer-list.png", read(file))
+
+
+def guide_viewer_light(studio: Studio) -> None:
+    """The viewer in its light theme, path tracing, with the section Light."""
+    # a section is called View, too, so the menu is pressed by its place
+    script = ["wait picture", "press 56 13", "wait 1", "click Theme", "click Light", "key Escape", "wait 1", "click Light", "wait 150"]
+    script.append(f"screenshot {(file := studio.path('.png'))}")
+    options = ["--integrator", "path", "--preset", "balanced", "--environment", "studio"]
+    studio.view("\n".join(script) + "\n", "builtin:parade", "--size", "1160x640", *options)
+    studio.save("guide-viewer-light.png", read(file))
+
+
 # ---- the gallery ----
 
 
@@ -543,6 +635,16 @@ PICTURES: dict[str, Callable[[Studio], None]] = {
     "ao-vs-path": ao_vs_path,
     "baking": baking,
     "resuming": resuming,
+    "guide-install": guide_install,
+    "guide-first": guide_first,
+    "guide-environments": guide_environments,
+    "guide-lights": guide_lights,
+    "guide-roughness": guide_roughness,
+    "guide-presets": guide_presets,
+    "guide-parade": guide_parade,
+    "guide-turn": guide_turn,
+    "guide-viewer-list": guide_viewer_list,
+    "guide-viewer-light": guide_viewer_light,
     "gallery-ao": gallery_ao,
     "gallery-bent": gallery_bent,
     "gallery-truth": gallery_truth,
@@ -566,7 +668,7 @@ def main() -> None:
     args = parser.parse_args()
     if args.list:
         for name, make in PICTURES.items():
-            print(f"{name:18}{(make.__doc__ or '').splitlines()[0]}")
+            print(f"{name:20}{(make.__doc__ or '').splitlines()[0]}")
         return
     if not args.skylit.exists():
         sys.exit(f"pictures: {args.skylit} is not there: `cargo build --release --features probes` makes it, or name another program")
