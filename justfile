@@ -43,3 +43,7 @@ results:
 # a kit for a machine with a GPU
 gpu:
     ./scripts/gpu.sh
+
+# pages of docs/results from their records; `just results measure --quick` measures
+results *ARGS:
+    python3 scripts/results.py {{ ARGS }}

@@ -2,7 +2,7 @@
 # What skylit does on a GPU, tried where there is one: builds a kit here, prints the one command that runs it there, and turns what comes back into a page.
 #
 #   ./scripts/gpu.sh                     builds target/gpu-kit and target/gpu-kit.tar.gz, and prints the command
-#   ./scripts/gpu.sh report FOLDER       turns the folder that the command wrote (or its results.tar.gz) into docs/gpu.md
+#   ./scripts/gpu.sh report FOLDER       turns the folder that the command wrote (or its results.tar.gz) into docs/results/gpu.md
 #
 # The other machine needs Linux on x86-64 with glibc 2.35 or newer (Ubuntu 22.04, Debian 12), bash, coreutils and a Vulkan driver: no network, no compiler, no
 # Python. What containers often lack is in the kit: the Vulkan loader, the validation layer, the libraries that NVIDIA's driver asks for; and where
@@ -18,7 +18,7 @@ die() { printf 'gpu: error: %s\n' "$*" >&2; exit 1; }
 if [ "${1:-}" = report ]; then
   [ -n "${2:-}" ] || die "which folder? ./scripts/gpu.sh report FOLDER"
   command -v python3 >/dev/null 2>&1 || die "the report is written by Python 3, which is not here"
-  exec python3 scripts/gpu/report.py "$2" "${3:-docs/gpu.md}"
+  exec python3 scripts/gpu/report.py "$2" "${3:-docs/results/gpu.md}"
 fi
 [ $# = 0 ] || die "expected nothing, or: report FOLDER"
 [ "$(uname -sm)" = "Linux x86_64" ] || die "the kit is for Linux on x86-64, and is built there"

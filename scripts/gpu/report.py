@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The page of what skylit did on a GPU, from the folder that the kit of scripts/gpu.sh wrote there.
 
-    python3 scripts/gpu/report.py RESULTS docs/gpu.md      # RESULTS: the folder, or its .tar.gz
+    python3 scripts/gpu/report.py RESULTS docs/results/gpu.md   # RESULTS: the folder, or its .tar.gz
 
 Images that are small enough to live in the repository go beside the page, into the folder of its name. Whatever is missing in RESULTS is missing in the page."""
 
@@ -16,8 +16,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))
-from bench_table import distinct, find, middle, number, pivot, table, title, value  # noqa: E402
+sys.path.append(str(Path(__file__).resolve().parents[1] / "results"))
+import pages  # noqa: E402
+from tables import number, table  # noqa: E402
 
 # bytes of an image, and of all of them, that may go into the repository
 LARGEST = 200_000
@@ -156,35 +157,19 @@ def differences(record: dict[str, Any]) -> str:
     return ", ".join(f"{c.get('name', c.get('channel'))} {number(c.get('rmse'))}" for c in channels if number(c.get("rmse")) != "-") or "-"
 
 
-def cell(all: list[dict[str, Any]], contestant: str, quantity: str) -> str:
-    """The value; of times the median, and what 95 % of frames keep within."""
-    for m in all:
-        if m["contestant"] == contestant and m["quantity"] == quantity and not m.get("at"):
-            return f"{number(middle(m))} ({number(m['values']['p95'])})" if isinstance(m["values"], dict) else number(middle(m))
-    return "-"
-
-
-def frames(folder: Path) -> list[str]:
-    """Presets in real time: of ambient occlusion, and of light."""
-    records = [load(path) for path in [folder / "bench-ao.json", *sorted(folder.glob("bench-frames*.json"))]]
-    return [line for record in records if record for line in frames_of(record)]
-
-
-def frames_of(record: dict[str, Any]) -> list[str]:
-    settings = record["settings"]
-    lines = [f"## Frames in real time, {settings['integrator']}, {settings['size']}", "", f"Tracer `{settings['tracer']}`, {settings['frames']} frames, references of {settings['reference paths']} samples per pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
-    for scene in distinct(m["scene"] for m in record["measurements"]):
-        rows = []
-        for part in ("still", "still, camera rays", "orbit", "sun", "animation"):
-            own, passes = find(record, scene, part), find(record, scene, f"{part}, passes")
-            for preset in distinct(m["contestant"] for m in own if m["contestant"] != "reference"):
-                errors = " / ".join(number(value(own, preset, name)) for name in ("RMSE", "plain RMSE"))
-                times = ", ".join(f"{m['quantity']} {number(middle(m))}" for m in passes if m["contestant"] == preset)
-                rows.append([f"`{preset}`", part, cell(own, preset, "time"), cell(own, preset, "wall time"), errors, times])
-        about = next((s["about"] for s in record["scenes"] if s["scene"] == scene), "")
-        lines += [f"{scene}: {about}", ""]
-        lines += table(["preset", "part", "device ms", "wall ms", "RMSE / plain", "passes, ms"], rows)
-    return lines + notes(record)
+def bench(folder: Path) -> list[str]:
+    """Presets in real time, of ambient occlusion and of light; rays a second; path tracing."""
+    named = [("bench-ao", pages.frames), *((p.stem, pages.frames) for p in sorted(folder.glob("bench-frames*.json")))]
+    lines = []
+    for name, body in [*named, ("bench-rays", pages.rays), ("bench-path", pages.path)]:
+        record = load(folder / f"{name}.json")
+        if record:
+            settings = record["settings"]
+            said = ", ".join(settings[k] for k in ("integrator", "size") if k in settings)
+            title = {"bench-rays": "Rays a second", "bench-path": "Path tracing: error against time"}.get(name)
+            lines += [f"## {title or f'Frames in real time, {said}'}", ""]
+            lines += [re.sub("^## ", "### ", line) for line in [*body(record), *pages.notes(record)]]
+    return lines
 
 
 def stress(folder: Path) -> list[str]:
@@ -202,42 +187,6 @@ def stress(folder: Path) -> list[str]:
         return []
     said = "Of `skylit stress`; what a ray-tracing driver answers for is reported, not judged."
     return ["## Numerical stability", "", said, "", *table(["tracer", "hold", "reported", "fail", "which"], rows)]
-
-
-def rays(folder: Path) -> list[str]:
-    record = load(folder / "bench-rays.json")
-    if not record:
-        return []
-    lines = ["## Rays a second", "", "Millions, by the device's clock; medians.", ""]
-    for scene in record["scenes"]:
-        name = scene["scene"]
-        own = [m for m in record["measurements"] if m["scene"] == name]
-        rates = [m for m in own if m["quantity"] == "rate"]
-        if not rates:
-            continue
-        streams, kernels = distinct(m["part"] for m in rates), distinct(m["contestant"] for m in rates)
-        rate = {(m["part"], m["contestant"]): number(middle(m)) for m in rates}
-        builds = ", ".join(f"{m['contestant']} {number(1000 * middle(m))} ms" for m in own if m["quantity"] == "build")
-        checked, wrong = (sum(middle(m) for m in own if m["quantity"] == q) for q in ("compared", "unexplained"))
-        lines += [f"{name}: {scene['about']}; built in {builds}; of {checked:,.0f} answers that were compared, {wrong:.0f} unexplained", ""]
-        lines += table(["rays", *(f"`{k}`" for k in kernels)], [[s, *(rate.get((s, k), "-") for k in kernels)] for s in streams])
-    return lines + notes(record)
-
-
-def paths(folder: Path) -> list[str]:
-    record = load(folder / "bench-path.json")
-    if not record:
-        return []
-    settings = record["settings"]
-    lines = ["## Path tracing: error against time", "", f"Tracer `{settings['tracer']}`, {settings['size']}.", ""]
-    for scene in distinct(m["scene"] for m in record["measurements"]):
-        lines += [scene, "", *pivot([m for m in find(record, scene, "images") if not m.get("at")], title)]
-    return lines + notes(record)
-
-
-def notes(record: dict[str, Any]) -> list[str]:
-    found = [f"- {n}" for n in record.get("notes", [])]
-    return [*found, ""] if found else []
 
 
 def gallery(folder: Path, page: Path) -> list[str]:
@@ -258,17 +207,6 @@ def gallery(folder: Path, page: Path) -> list[str]:
     return ["## Images", "", *lines, ""] if lines else []
 
 
-# what is written by hand stays when the page is made anew
-NOTES = ["<!-- notes: what is between these two lines is written by hand, and kept -->", "<!-- end of notes -->"]
-
-
-def kept(page: Path) -> list[str]:
-    old = text(page)
-    if not all(mark in old for mark in NOTES):
-        return []
-    return [NOTES[0], *old.split(NOTES[0], 1)[1].split(NOTES[1], 1)[0].splitlines()[1:], NOTES[1], ""]
-
-
 def main() -> None:
     if len(sys.argv) != 3:
         sys.exit(__doc__)
@@ -282,8 +220,8 @@ def main() -> None:
     lines = ["# skylit on a GPU", "", "Written by `./scripts/gpu.sh report` from what the kit of `./scripts/gpu.sh` brought back.", ""]
     if "cpu" in kinds:
         lines += ["**This is no GPU**: the kit found a driver that runs on the CPU, and did little of everything.", ""]
-    lines += [*kept(page), *machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
-    for part in [images, parity, leaks, closed_forms, stress, frames, rays, paths]:
+    lines += [*machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
+    for part in [images, parity, leaks, closed_forms, stress, bench]:
         lines += part(folder)
     lines += gallery(folder, page)
     page.parent.mkdir(parents=True, exist_ok=True)

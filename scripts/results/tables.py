@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Tables of a page of docs/ from a JSON record of `skylit bench`, as Markdown, so that no figure is typed.
+"""Markdown tables of a JSON record of `skylit bench`, so that no figure is typed.
 
-    python3 scripts/bench_table.py RECORD.json                                    # every part of every scene
-    python3 scripts/bench_table.py RECORD.json --part still --quantities "time,RMSE,over plain"
-    python3 scripts/bench_table.py RECORD.json --part still --quantities RMSE --along   # by frame
+    python3 scripts/results/tables.py RECORD.json                                    # every part of every scene
+    python3 scripts/results/tables.py RECORD.json --part still --quantities "time,RMSE,over plain"
+    python3 scripts/results/tables.py RECORD.json --part still --quantities RMSE --along   # by frame
 
 A row a contestant, a column a quantity; with --along a column a place along the axis."""
 
@@ -38,24 +38,28 @@ def along(m: Measurement) -> bool:
 
 
 def find(record: dict[str, Any], scene: str, part: str) -> list[Measurement]:
-    """What was measured of a part of a scene."""
+    """All measurements of a part of a scene."""
     return [m for m in record["measurements"] if m["scene"] == scene and m["part"] == part]
 
 
 def value(all: list[Measurement], contestant: str, quantity: str) -> Any:
     """A result that stands alone; None where there is none."""
-    return next((middle(m) for m in all if m["contestant"] == contestant and m["quantity"] == quantity and not along(m)), None)
+    found = (m for m in all if m["contestant"] == contestant and m["quantity"] == quantity and not along(m))
+    return next((middle(m) for m in found), None)
 
 
 def distinct(names: Any) -> list[Any]:
+    """Each name once, in the order of their first occurrence."""
     return list(dict.fromkeys(names))
 
 
 def title(m: Measurement) -> str:
+    """The heading of a quantity's column."""
     return f"{m['quantity']}, {m['unit']}" if m["unit"] else m["quantity"]
 
 
 def table(head: list[str], rows: list[list[str]]) -> list[str]:
+    """Lines of a Markdown table, and an empty one."""
     return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(r) + " |" for r in rows), ""]
 
 
@@ -78,6 +82,8 @@ def main() -> None:
     parser.add_argument("--along", action="store_true")
     arguments = parser.parse_args()
     record = json.loads(arguments.record.read_text())
+    # a file of docs/results/data holds the record
+    record = record.get("record", record)
     wanted = arguments.quantities.split(",") if arguments.quantities else None
     chosen = [m for m in record["measurements"] if wanted is None or m["quantity"] in wanted]
     for scene in distinct(m["scene"] for m in chosen):

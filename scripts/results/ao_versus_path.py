@@ -1,24 +1,19 @@
-#!/usr/bin/env python3
-"""Makes the tables of docs/ao-versus-path.md: skylit compare ao-vs-path of many scenes.
+"""Tables of `skylit compare ao-vs-path` of many scenes, and the scenes."""
 
-    python3 scripts/ao_versus_path.py [--program target/release/skylit] [--scenes FOLDER] [--size WxH] [--json FILE] [--saved FILE] [NAME...]
-
-FOLDER has the scenes of others (sponza, flight_helmet, brhan); what is missing is left out. --json keeps all records;
---saved prints the tables of records that were kept, without measuring.
-"""
-
-import argparse
 import json
-import pathlib
 import subprocess
 import sys
+import time
+from pathlib import Path
 
-SPONZA_NAVE = ["--eye=-120,20,-5", "--target=50,35,0", "--fov-y=70"]
+from tables import table
+
+NAVE = ["--eye=-120,20,-5", "--target=50,35,0", "--fov-y=70", "--light=sphere position=30,70,-5 radius=4 radiance=400"]
 SUN = "sun direction=-1,-3,-2 irradiance=3 angle=0.5"
 SKY = "--environment=1,1,1"
 # name, scene, options
 SCENES = [
-    ("Sponza, nave, lamp", "sponza/sponza.glb", SPONZA_NAVE + ["--light=sphere position=30,70,-5 radius=4 radiance=400"]),
+    ("Sponza, nave, lamp", "sponza/sponza.glb", NAVE),
     ("FlightHelmet, sky", "flight_helmet/FlightHelmet.gltf", [SKY]),
     ("FlightHelmet, sun and sky", "flight_helmet/FlightHelmet.gltf", ["--environment=0.3,0.4,0.6", "--light=" + SUN]),
     ("CornellBox-Original (.brhan)", "brhan/scenes", []),
@@ -41,9 +36,14 @@ FLAT, UNLIMITED, EXACT = "ambient light without occlusion", "AO without radius o
 SKY_FLAT, RADIUS, FALLOFF = "the same everywhere", "AO with the best radius", "AO with the best falloff"
 # points of what is explained, below which a radius or falloff is called none
 LEAST_GAIN = 0.1
-HEAD = "| scene and light | bounces | none | AO, no limit | best radius | best falloff | `ao-sky` | radius | halves | ambient radiance |"
-SKY_HEAD = "| scene | the same everywhere | AO, no limit, as it is | AO, no limit, scaled | best radius | best falloff | radius | halves | scale |"
-SIMILARITY_HEAD = "| | Tanimoto | minimum ratio |"
+HEAD = [
+    "scene and light", "bounces", "none", "AO, no limit", "best radius", "best falloff", "`ao-sky`", "radius", "halves",
+    "ambient radiance",
+]
+SKY_HEAD = [
+    "scene", "the same everywhere", "AO, no limit, as it is", "AO, no limit, scaled", "best radius", "best falloff",
+    "radius", "halves", "scale",
+]
 
 
 def expand(folder):
@@ -58,13 +58,40 @@ def expand(folder):
             yield name, str(folder / scene), options
 
 
-def run(program, scene, options, size):
-    command = [program, "compare", "ao-vs-path", scene, "--size", size, "--spp", "32", "--ao-samples", "64", "--json", *options]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
-    if done.returncode != 0:
-        print(f"{scene}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
-        return None
-    return json.loads(done.stdout)
+def measure(program, folder, options):
+    """A compact record of each scene that can be compared, and why others are left out."""
+    records, notes = [], []
+    for name, scene, own in expand(folder):
+        begin = time.monotonic()
+        command = [program, "compare", "ao-vs-path", scene, "--json", *options, *own]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            reason = done.stderr.strip().splitlines()[-1].split(".brhan: ")[-1].split(";")[0]
+            notes.append(f"{name} is left out: {reason}")
+        else:
+            records.append(compact(name, json.loads(done.stdout)))
+        print(f"{name}: {time.monotonic() - begin:.0f} s", file=sys.stderr)
+    return records, notes
+
+
+def compact(name, record):
+    """The figures that the tables have; the curves over all radii are left out."""
+
+    def fit(found):
+        if found is None:
+            return None
+        best = {k: {n: v for n, v in found[k].items() if n != "rmse"} for k in ("binary", "falloff", "best")}
+        rows = [{"name": r["name"], "explained": r["explained"]} for r in found["rows"]]
+        return {"environment_light": found["environment_light"], "rows": rows, "metrics": found["metrics"], **best}
+
+    return {
+        "name": name,
+        "scene": Path(record["scene"]).name,
+        "diagonal": record["diagonal"],
+        "light": {"bounces": record["light"]["bounces"]},
+        "path": [fit(f) for f in record["path"]],
+        "sky": fit(record["sky"]),
+    }
 
 
 def number(x):
@@ -76,7 +103,7 @@ def explained(fit, name):
 
 
 def distance(fit, choice, key, name, flat, end):
-    """The best radius or half distance with its standard error; none where it explains hardly more than ambient light without occlusion."""
+    """The best radius or half distance and its standard error; none where it hardly beats no occlusion."""
     value, error = fit[choice][key], fit[choice]["standard_error"]
     if explained(fit, name) - explained(fit, flat) < LEAST_GAIN:
         return "none"
@@ -103,39 +130,13 @@ def row(name, record, fit):
         cells = [name, *values, *limits, f"{fit['best']['ambient'][0]:.2f}"]
     else:
         bounces = f"{100 * record['light']['bounces']:.0f}"
-        cells = [name, bounces, *values, f"{explained(fit, EXACT):.1f}", *limits, ", ".join(number(c) for c in fit["best"]["ambient"])]
-    return "| " + " | ".join(cells) + " |"
+        ambient = ", ".join(number(c) for c in fit["best"]["ambient"])
+        cells = [name, bounces, *values, f"{explained(fit, EXACT):.1f}", *limits, ambient]
+    return cells
 
 
-def similarity(name, fit):
-    return f"| ours, {name} | {fit['metrics']['tanimoto']:.4f} | {fit['metrics']['minimum_ratio']:.4f} |"
-
-
-def measure(arguments):
-    for name, scene, options in expand(arguments.scenes):
-        if arguments.names and not any(n in name for n in arguments.names):
-            continue
-        record = run(arguments.program, scene, options, arguments.size)
-        if record is not None:
-            print(f"{name}: {record['seconds']:.0f} s", file=sys.stderr)
-            yield {"name": name, **record}
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", default="target/release/skylit")
-    parser.add_argument("--scenes", type=pathlib.Path, default=pathlib.Path("../shared/scenes"))
-    parser.add_argument("--size", default="640x360")
-    parser.add_argument("--json", type=pathlib.Path)
-    parser.add_argument("--saved", type=pathlib.Path)
-    parser.add_argument("names", nargs="*")
-    arguments = parser.parse_args()
-    if arguments.saved:
-        records = json.loads(arguments.saved.read_text())
-    else:
-        records = list(measure(arguments))
-    if arguments.json:
-        arguments.json.write_text(json.dumps(records, indent=1) + "\n")
+def tables(records):
+    """Three tables of what is explained, and one of similarity."""
     ambient, traced, sky, similar, seen = [], [], [], [], set()
     for record in records:
         for fit in record["path"]:
@@ -145,16 +146,15 @@ def main():
         if fit and record["scene"] not in seen:
             seen.add(record["scene"])
             sky.append(row(name, record, fit))
-            similar.append(similarity(name, fit))
-    for title, head, rows in [
+            metrics = fit["metrics"]
+            similar.append([name, f"{metrics['tanimoto']:.4f}", f"{metrics['minimum_ratio']:.4f}"])
+    lines = []
+    for heading, head, rows in [
         ("Ambient light in place of environment and bounces", HEAD, ambient),
         ("Ambient light in place of bounces", HEAD, traced),
-        ("Ambient visibility by itself, against ao-sky", SKY_HEAD, sky),
-        ("The same beside Larsen's figures", SIMILARITY_HEAD, similar),
+        ("Ambient visibility by itself, against `ao-sky`", SKY_HEAD, sky),
+        ("Similarity to `ao-sky`, by Larsen's two measures", ["scene", "Tanimoto", "minimum ratio"], similar),
     ]:
-        print(f"\n{title}\n\n{head}\n|" + "---|" * (head.count("|") - 1))
-        print("\n".join(rows))
-
-
-if __name__ == "__main__":
-    main()
+        if rows:
+            lines += [f"## {heading}", "", *table(head, rows)]
+    return lines

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Similarity of real-time to offline ambient occlusion as Larsen (2019) measured it: his two measures over whole 8-bit grey images on white. Makes a table of docs/ao-versus-path.md.
+"""Similarity of real-time to offline ambient occlusion as Larsen (2019) measured it, as a table: his two measures over
+whole 8-bit grey images on white.
 
-    python3 scripts/larsen_similarity.py [--skylit PROGRAM] [--size 480x270] [--spp 1024] SCENE:RADIUS...
+    python3 scripts/results/larsen_similarity.py [--skylit PROGRAM] [--size 480x270] [--spp 1024] SCENE:RADIUS...
 
 RADIUS is the distance in scene units at which a hit counts 1/255. Python's own library is enough."""
 
