@@ -37,8 +37,8 @@ reference:
     cargo run --locked -- man docs/reference/commands --format markdown
 
 # pages of what was measured, from saved records
-results:
-    python3 scripts/results.py
+results *ARGS:
+    python3 scripts/results.py {{ ARGS }}
 
 # a kit for a machine with a GPU
 gpu:

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Makes docs/images/materials.png: a ball for each extension of glTF's materials, path traced before a soft lamp.
+"""Makes docs/images/materials.png, a ball for each extension of glTF's materials, and docs/images/ball-NAME.png, a ball for each
+material of docs/reference/materials.md: path traced before a soft lamp.
 
-    python3 scripts/material_balls.py [SKYLIT]      # the program, target/release/skylit unless given; some minutes on two cores
-    python3 scripts/material_balls.py --scene FILE.gltf     # the scene alone
+    python3 scripts/material_balls.py [SKYLIT]              # the program, target/release/skylit unless given; some minutes on two cores
+    python3 scripts/material_balls.py [SKYLIT] --only glass # one of the single balls, by its name
+    python3 scripts/material_balls.py --scene FILE.gltf     # the scene of all balls alone
 
 Python's own library is enough."""
 
@@ -18,11 +20,14 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-OUT = ROOT / "docs/images/materials.png"
+OUT = ROOT / "docs/images"
 RENDER = [
-    *["--integrator", "path", "--size", "540x300", "--spp", "128", "--tone-map", "agx", "--denoise", "--environment", "0.5,0.57,0.7"],
+    *["--integrator", "path", "--spp", "128", "--tone-map", "agx", "--denoise", "--environment", "0.5,0.57,0.7", "--quiet"],
     *["--light", "disk position=5,9,5 direction=-5,-9,-5 radius=4 radiance=7", "--light", "disk position=-9,5,9 direction=9,-5,-9 radius=1.5 radiance=14 color=1,0.8,0.6"],
 ]
+# of a picture of all balls, and of one
+ALL = ["--size", "540x300"]
+ONE = ["--size", "128x128", "--spp", "512", "--eye", "0,2.6,7", "--target", "0,0.95,0", "--fov-y", "20"]
 RINGS, SECTORS = 48, 96
 VOLUME = {"thicknessFactor": 1}
 
@@ -48,6 +53,29 @@ BALLS = {
     ),
     "diffuse transmission": ([0.3, 0.5, 0.08], 0, 0.6, {"diffuse_transmission": {"diffuseTransmissionFactor": 0.6, "diffuseTransmissionColorFactor": [0.4, 0.6, 0.1]}}),
 }
+
+# balls that are shown alone, as BALLS; what else the material has comes last
+SINGLE = {
+    "matte": ([0.6, 0.3, 0.15], 0, 1, {"specular": {"specularFactor": 0}}, {}),
+    "rough diffuse": ([0.6, 0.3, 0.15], 0, 1, {}, {"extras": {"sigma": 1}}),
+    "dielectric": ([0.05, 0.25, 0.5], 0, 0.2, {}, {}),
+    "metal": ([0.9, 0.65, 0.35], 1, 0.25, {}, {}),
+    "specular": ([0.05, 0.25, 0.5], 0, 0.2, {"specular": {"specularFactor": 1, "specularColorFactor": [9, 3, 1]}}, {}),
+    "thin walls": ([0.9, 0.6, 0.3], 0, 0.0, {"transmission": {"transmissionFactor": 1}}, {}),
+    "rough thin walls": ([0.9, 0.6, 0.3], 0, 0.5, {"transmission": {"transmissionFactor": 1}}, {}),
+    "rough glass": ([1, 1, 1], 0, 0.4, {"transmission": {"transmissionFactor": 1}, "volume": VOLUME}, {}),
+    "emission": ([0, 0, 0], 0, 1, {}, {"emissiveFactor": [1, 0.45, 0.1]}),
+    "unlit": ([0.6, 0.3, 0.15], 0, 1, {"unlit": {}}, {}),
+    "blend": ([0.6, 0.3, 0.15], 0, 1, {}, {"alphaMode": "BLEND", "alpha": 0.5}),
+}
+# named materials of .brhan
+BRHAN = {
+    "mirror": "material[mirror] reflectance[0.95 0.95 0.95]",
+    "glass": "material[glass] reflectance[1 1 1] transmittance[1 1 1]",
+    "copper": "material[copper]",
+    "gold": "material[gold]",
+}
+GREYS = [0.55, 0.12]
 
 
 class Buffer:
@@ -103,23 +131,25 @@ def floor(buffer: Buffer, parity: int) -> dict:
     return buffer.primitive(points, [(0, 1, 0)] * len(points), [(0, 0)] * len(points), indices)
 
 
-def scene() -> dict:
-    """The file."""
+def scene(balls: dict) -> dict:
+    """The file: rows of five balls on a floor; one alone is in the middle."""
     buffer, materials, meshes, nodes = Buffer(), [], [], []
 
-    def place(primitive: dict, name: str, color: list, metallic: float, roughness: float, extensions: dict, at: list) -> None:
-        pbr = {"baseColorFactor": [*color, 1], "metallicFactor": metallic, "roughnessFactor": roughness}
+    def place(primitive: dict, name: str, color: list, metallic: float, roughness: float, extensions: dict, more: dict, at: list) -> None:
+        pbr = {"baseColorFactor": [*color, more.get("alpha", 1)], "metallicFactor": metallic, "roughnessFactor": roughness}
         extensions = {f"KHR_materials_{key}": value for key, value in extensions.items()}
-        materials.append({"name": name, "pbrMetallicRoughness": pbr, "extensions": extensions})
+        more = {key: value for key, value in more.items() if key != "alpha"}
+        materials.append({"name": name, "pbrMetallicRoughness": pbr, "extensions": extensions, **more})
         meshes.append({"name": name, "primitives": [{**primitive, "material": len(materials) - 1}]})
         nodes.append({"name": name, "mesh": len(meshes) - 1, "translation": at})
 
     shape = ball(buffer)
-    for k, (name, (color, metallic, roughness, extensions)) in enumerate(BALLS.items()):
+    for k, (name, (color, metallic, roughness, extensions, *more)) in enumerate(balls.items()):
         row, column = divmod(k, 5)
-        place(shape, name, color, metallic, roughness, extensions, [2.5 * (column - 2), 1, 4 * row - 3])
-    for parity, grey in enumerate([0.55, 0.12]):
-        place(floor(buffer, parity), "floor", [grey] * 3, 0, 0.8, {}, [0, 0, 0])
+        at = [2.5 * (column - 2), 1, 4 * row - 3] if len(balls) > 1 else [0, 1, 0]
+        place(shape, name, color, metallic, roughness, extensions, more[0] if more else {}, at)
+    for parity, grey in enumerate(GREYS):
+        place(floor(buffer, parity), "floor", [grey] * 3, 0, 0.8, {}, {}, [0, 0, 0])
     tilt = math.radians(-27)
     nodes.append({"camera": 0, "translation": [0, 8.6, 14.5], "rotation": [math.sin(tilt / 2), 0, 0, math.cos(tilt / 2)]})
     used = sorted({name for material in materials for name in material["extensions"]})
@@ -132,15 +162,46 @@ def scene() -> dict:
     }
 
 
+def write_brhan(folder: Path, material: str) -> Path:
+    """A .brhan file of one ball on the floor."""
+    models = folder / "models"
+    models.mkdir(exist_ok=True)
+    text = f"Sphere center[0 1 0] radius[1] {material}\n"
+    for parity, grey in enumerate(GREYS):
+        corners = [(x + dx, z + dz) for x in range(-12, 12) for z in range(-10, 6) if (x + z) % 2 == parity for dx, dz in [(0, 0), (0, 1), (1, 1), (1, 0)]]
+        lines = [f"v {x} 0 {z}" for x, z in corners] + [f"f {k} {k + 1} {k + 2} {k + 3}" for k in range(1, len(corners), 4)]
+        (models / f"floor{parity}.obj").write_text("\n".join(lines) + "\n")
+        text += f"Model file[models/floor{parity}.obj] material[matte] diffuse[{grey} {grey} {grey}]\n"
+    file = folder / "ball.brhan"
+    file.write_text(text)
+    return file
+
+
 def main() -> None:
     if sys.argv[1:2] == ["--scene"]:
-        Path(sys.argv[2]).write_text(json.dumps(scene()))
+        Path(sys.argv[2]).write_text(json.dumps(scene(BALLS)))
         return
-    program = sys.argv[1] if len(sys.argv) > 1 else ROOT / "target/release/skylit"
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "materials.gltf"
-        file.write_text(json.dumps(scene()))
-        subprocess.run([program, "render", file, "-o", OUT, *RENDER], check=True)
+    arguments = sys.argv[1:]
+    only = arguments.pop(arguments.index("--only") + 1) if "--only" in arguments else None
+    arguments = [a for a in arguments if a != "--only"]
+    program = arguments[0] if arguments else ROOT / "target/release/skylit"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        file = folder / "materials.gltf"
+
+        def render(source: Path, out: str, view: list) -> None:
+            subprocess.run([program, "render", source, "-o", OUT / out, *RENDER, *view], check=True)
+
+        for ball_name, entry in {**BALLS, **SINGLE}.items():
+            if only in (None, ball_name):
+                file.write_text(json.dumps(scene({ball_name: entry})))
+                render(file, f"ball-{ball_name.replace(' ', '-')}.png", ONE)
+        for ball_name, material in BRHAN.items():
+            if only in (None, ball_name):
+                render(write_brhan(folder, material), f"ball-{ball_name}.png", ONE)
+        if only is None:
+            file.write_text(json.dumps(scene(BALLS)))
+            render(file, "materials.png", ALL)
 
 
 if __name__ == "__main__":

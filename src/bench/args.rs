@@ -23,11 +23,11 @@ pub enum Benchmark {
     Rays(Box<BenchRaysArgs>),
     /// Real-time ambient occlusion: `frames --integrator ao`
     Ao(Box<BenchFramesArgs>),
-    /// Frames in real time of any integrator: time and error of each preset beside plain accumulation at equal time, by scene and kind of motion
+    /// Frames in real time: time and error of each preset beside plain accumulation at equal time
     Frames(Box<BenchFramesArgs>),
     /// Path tracing: error over time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
-    /// Builders of hierarchies: what rays cost in trees that were built for them, in visits and rates, beside the results of Falcone (2024)
+    /// Builders of hierarchies: what rays cost in trees built for them, beside Falcone (2024)
     Builders(Box<BenchBuildersArgs>),
     /// Show, plot and compare saved JSON records of the benchmarks without measuring anything
     Report(BenchReportArgs),

@@ -34,7 +34,7 @@ pub struct CommonArgs {
     /// Run with the Vulkan validation layer (slower); any message from it fails the run
     #[arg(long)]
     pub validation: bool,
-    /// Compare with an earlier JSON record of this benchmark; anything that is worse beyond noise is named and fails the run
+    /// Compare with an earlier JSON record, and fail if anything is worse beyond noise
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
     pub baseline: Option<PathBuf>,
     /// Also write a CSV table, one row per result

@@ -23,7 +23,9 @@ pub struct BenchReportArgs {
     /// JSON records of benchmarks, in any order
     #[arg(required = true, value_name = "RECORD.json", value_hint = ValueHint::FilePath)]
     pub records: Vec<PathBuf>,
-    /// Compare with an earlier JSON record of the same benchmark; once for each benchmark. Anything that is worse beyond noise is named and fails
+    /// Compare with an earlier JSON record, and fail if anything is worse beyond noise
+    ///
+    /// It may be given once for each benchmark.
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
     pub baseline: Vec<PathBuf>,
     /// Outputs. What follows a bare `--json` is a record to read, so a file needs an `=` here.

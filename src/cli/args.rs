@@ -18,19 +18,30 @@ use crate::tracer::DeviceSettings;
 /// Which files of a scene are read, and which of a file's scenes.
 #[derive(Clone, Debug, Default, Args)]
 pub struct LoadArgs {
-    /// Scene of a glTF file that has several, by its name or its number from 0 [default: the one that the file names]
+    /// Scene of a glTF file, by its name or its number from 0 [default: the one that the file
+    /// names]
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Scene", hide_short_help = true)]
     pub gltf_scene: Option<String>,
-    /// Shading normals in place of the file's: file, flat, smooth, or smooth across edges at which the surface bends by up to ANGLE degrees [default: file, and flat where the file has none]
+    /// Shading normals: the file's, flat, smooth, or smooth at edges of up to ANGLE degrees
+    /// [default: file]
+    ///
+    /// `smooth` takes the mean of the normals of the triangles around a vertex. With ANGLE, edges
+    /// at which the surface bends by more degrees stay sharp. A mesh whose file has no normals is
+    /// flat by default.
     #[arg(long, value_name = "file|flat|smooth|ANGLE", help_heading = "Scene", hide_short_help = true)]
     pub normals: Option<NormalSource>,
-    /// Texture coordinates for meshes that have none and whose material has textures, projected from the bounds of each mesh [default: none]
+    /// Project texture coordinates onto meshes that have none [default: none]
+    ///
+    /// Meshes get them whose material has textures, projected from the bounds of each mesh. Others
+    /// keep theirs.
     #[arg(long, value_enum, value_name = "PROJECTION", help_heading = "Scene", hide_short_help = true)]
     pub uv: Option<Projection>,
     /// Axis of the file that points up: z in files of CAD programs, robots and maps [default: y]
     #[arg(long, value_enum, value_name = "y|z", help_heading = "Scene", hide_short_help = true)]
     pub up_axis: Option<UpAxis>,
-    /// Refuse a scene that refers to files outside of its own folder: for scenes of strangers, which could name any file of this machine
+    /// Refuse a scene that refers to files outside of its own folder
+    ///
+    /// It is for scenes of strangers, which could name any file of this machine.
     ///
     /// Buffers, images, material libraries and models count, links in the folder that lead out of it, and what a skylit.toml beside the scene names.
     #[arg(long, hide_short_help = true)]
@@ -172,10 +183,14 @@ pub struct DiffArgs {
     pub a: PathBuf,
     /// Second image: the reference, for metrics that are not symmetric
     pub b: PathBuf,
-    /// Fail (exit code 1) if the RMSE of a compared channel exceeds this; without it only NaN and images with no pixel to compare fail
+    /// Fail (exit code 1) if the RMSE of a compared channel exceeds this [default: no bound]
+    ///
+    /// Without it only NaN and images with no pixel to compare fail.
     #[arg(long, value_name = "X", value_parser = parse_limit, allow_hyphen_values = true)]
     pub max_rmse: Option<f64>,
-    /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels; the others are only listed]
+    /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels]
+    ///
+    /// The others are only listed.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub channels: Vec<String>,
     /// Compare all pixels, also black ones that neither image covers

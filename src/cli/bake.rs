@@ -75,13 +75,15 @@ pub struct BakeArgs {
     /// Integrator of --map light: path, direct, whitted or ao-sky [default: path]
     #[arg(long, value_name = "NAME", value_parser = str::parse::<IntegratorName>)]
     pub integrator: Option<IntegratorName>,
-    /// Maximum path length of --map light in bounces: 1 is direct light [default: the scene's, or no limit]
+    /// Maximum path length of --map light in bounces; 1 is direct light [default: no limit]
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
-    /// Radius: hits beyond do not occlude; of thickness and curvature the length of rays [default: that of `render`; 10% for thickness, 1% for curvature]
+    /// Radius of occlusion [default: that of `render`; of thickness 10%, of curvature 1%]
+    ///
+    /// Hits beyond do not occlude. Of thickness and curvature it is the length of rays.
     #[arg(long, value_name = "R|PERCENT%|auto", value_parser = str::parse::<Length>)]
     pub ao_radius: Option<Length>,
     /// Falloff: a hit at distance d occludes by C^-d; 1 is binary [default: 1]
@@ -93,7 +95,9 @@ pub struct BakeArgs {
     /// What occludes a surface
     #[arg(long, value_enum, default_value = "scene")]
     pub occluders: Occluders,
-    /// Detailed model whose surfaces are baked onto this one (high to low): maps show what lies within --cage of a texel along its normal
+    /// Detailed model whose surfaces are baked onto this one (high to low)
+    ///
+    /// Maps show what lies within --cage of a texel along its normal.
     #[arg(long, value_name = "MODEL", value_hint = ValueHint::FilePath)]
     pub from: Option<String>,
     /// Distance from the surface within which those of --from are looked for, on both sides [default: 2%]
@@ -102,7 +106,9 @@ pub struct BakeArgs {
     /// A ground plane under the scene occludes, too
     #[arg(long)]
     pub ground: bool,
-    /// Texture coordinates: the number of a set, `unwrap` for new ones, or `auto`, which takes set 1 or 0 if no two places share a texel, else new ones
+    /// Texture coordinates: the number of a set, `unwrap` for new ones, or `auto`
+    ///
+    /// `auto` takes set 1 or 0 if no two places share a texel, else new ones.
     #[arg(long, value_name = "auto|N|unwrap", default_value = "auto", value_parser = str::parse::<TexcoordChoice>)]
     pub texcoord: TexcoordChoice,
     /// Texels around charts that get the value of the nearest covered texel [default: all]
@@ -123,10 +129,12 @@ pub struct BakeArgs {
     /// Bits of a channel of PNG files and of textures in a model
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = parse_bits)]
     pub bits: Bits,
-    /// Pack occlusion, roughness and metalness into one texture, where a material has them by the same coordinates
+    /// Pack occlusion, roughness and metalness into one texture
+    ///
+    /// It is done where a material has them by the same coordinates.
     #[arg(long, value_name = "orm", value_parser = ["orm"])]
     pub pack: Option<String>,
-    /// Render the written model with its baked and with traced ambient occlusion, and report how far apart they are
+    /// Render the model with baked and with traced ambient occlusion, and report their difference
     #[arg(long)]
     pub verify: bool,
     /// Light of --map light

@@ -59,16 +59,22 @@ pub struct BvhArgs {
     /// How the trees are built
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildMethod,
-    /// Recorded rays to measure with, as `render --dump-rays` writes them: f32 origin[3], tmin, direction[3], tmax each
+    /// Recorded rays to measure with, as `render --dump-rays` writes them
+    ///
+    /// Each is f32 origin[3], tmin, direction[3], tmax.
     #[arg(long, value_name = "RAYS.bin", value_hint = ValueHint::FilePath, conflicts_with_all = ["direction", "eye"])]
     pub rays: Option<PathBuf>,
-    /// Parallel rays of this direction: the tree is built for them by --build sah-spfh and pah..., judged by them, and measured with them
+    /// Direction of parallel rays to measure with
+    ///
+    /// The tree is built for them by --build sah-spfh and pah..., and judged by them.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, conflicts_with = "eye")]
     pub direction: Option<DVec3>,
     /// Rays through this point in place of parallel ones
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     pub eye: Option<DVec3>,
-    /// Also measure local trees of influence areas: those of a JSON file, of the scene's lights and cameras (`scene`), or of the recorded rays (`rays`)
+    /// Also measure local trees of influence areas: of a JSON file, `scene` or `rays`
+    ///
+    /// `scene` takes those of the scene's lights and cameras, `rays` that of the recorded rays.
     #[arg(long, value_name = "FILE.json|scene|rays", value_hint = ValueHint::FilePath)]
     pub areas: Option<String>,
     /// Bins between which split planes lie, for the rules of the laboratory
@@ -77,7 +83,9 @@ pub struct BvhArgs {
     /// Primitives at or below which the laboratory makes a leaf
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=4), hide_short_help = true)]
     pub leaf: u32,
-    /// Also count nodes and leaves of the seven-wide kernel's hierarchy: scenes of one level without spheres and alpha
+    /// Also count nodes and leaves of the seven-wide kernel's hierarchy
+    ///
+    /// It is for scenes of one level without spheres and alpha.
     #[arg(long)]
     pub wide: bool,
     /// Write the trees themselves: corners, children and primitives of each node

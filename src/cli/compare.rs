@@ -53,7 +53,9 @@ Examples:
 /// Comparisons that are not of images by letters.
 #[derive(Clone, Debug, clap::Subcommand)]
 pub enum OtherComparison {
-    /// Find the radius, falloff and ambient colour with which ambient occlusion is closest to path tracing, and how far it still is
+    /// Find the radius, falloff and colour with which ambient occlusion is closest to path tracing
+    ///
+    /// It also says how far apart the two still are.
     AoVsPath(Box<AoVsPathArgs>),
 }
 
@@ -64,14 +66,21 @@ pub struct CompareArgs {
     /// Another kind of comparison.
     #[command(subcommand)]
     pub comparison: Option<OtherComparison>,
-    /// Images (.exr, .png, .jpg, .webp): A, which is judged; B, the reference; C and more, which are judged, too. Those of --a, --b and --c take their letters first
+    /// Images (.exr, .png, .jpg, .webp): A, which is judged, then B, the reference
+    ///
+    /// C and more are judged, too. Images of --a, --b and --c take their letters first.
     #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
     pub images: Vec<PathBuf>,
-    /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of `skylit render` beside it apply to each render that they have an effect on
+    /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME
+    ///
+    /// Options of `skylit render` beside it apply to each render that they have an effect on.
     #[arg(long, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: Option<String>,
-    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --history 16". A preset alone is shown at rest,
-    /// when histories are full, and its first frame besides, as another image
+    /// Render image A of --scene: an integrator or a preset, then options of `skylit render`
+    ///
+    /// Examples are "ao --ao-radius 2" and "balanced --history 16". A preset of frames in real time
+    /// alone is shown at rest, when histories are full, and its first frame besides, as another
+    /// image.
     #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
     pub a: Option<String>,
     /// Render image B, like --a
@@ -89,19 +98,25 @@ pub struct CompareArgs {
     /// Compare only pixels of this rectangle: left, top, width and height in pixels
     #[arg(long, value_name = "X,Y,W,H", hide_short_help = true, value_parser = parse_rectangle)]
     pub rectangle: Option<[u32; 4]>,
-    /// Compare only pixels that show this instance (channel id.instance of the reference, or of the image; renders get it)
+    /// Compare only pixels that show this instance, by its number
+    ///
+    /// It is the channel id.instance of the reference, or of the image; renders get it.
     #[arg(long, value_name = "N", hide_short_help = true)]
     pub instance: Option<u32>,
     /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub channels: Vec<String>,
-    /// Write the signed difference from the reference as a picture with a legend; of several images NAME.a.png, NAME.c.png
+    /// Write the signed difference from the reference as a picture with a legend
+    ///
+    /// Of several images it writes NAME.a.png, NAME.c.png.
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
     pub difference: Option<PathBuf>,
     /// Write the FLIP map as a picture with a legend, named as those of --difference
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
     pub flip: Option<PathBuf>,
-    /// Write a report into this folder: a page that needs no network, with all images, differences and numbers
+    /// Write a report into this folder: a page that needs no network
+    ///
+    /// It has all images, differences and numbers.
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub html: Option<PathBuf>,
     /// Write all numbers into a table, a row for each image that is compared with the reference

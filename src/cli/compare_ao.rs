@@ -39,7 +39,9 @@ pub struct AoVsPathArgs {
     /// Image size in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x360")]
     size: [u32; 2],
-    /// Paths per pixel of the references; their noise does not count as an error, but makes the result uncertain
+    /// Paths per pixel of the references
+    ///
+    /// Their noise does not count as an error, but makes the result uncertain.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
     spp: u32,
     /// Occlusion rays per pixel
@@ -63,7 +65,9 @@ pub struct AoVsPathArgs {
     /// Also write the best `lit` image (R, G, B) with the layers path, direct, ao and sky
     #[arg(long, short, value_name = "FILE.exr", value_hint = ValueHint::FilePath)]
     output: Option<PathBuf>,
-    /// Write a report into this folder: a page that needs no network, with images, differences, tables and curves
+    /// Write a report into this folder: a page that needs no network
+    ///
+    /// It has images, differences, tables and curves.
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     html: Option<PathBuf>,
     /// Also plot the error over the radius, a line per falloff

@@ -13,7 +13,7 @@ use crate::terminal::console::Console;
 pub struct ConfigArgs {
     /// Read no defaults from skylit.toml, neither beside the scene nor in the configuration folder
     ///
-    /// docs/settings.md says which keys these files have.
+    /// docs/reference/settings.md says which keys these files have.
     #[arg(long, hide_short_help = true)]
     pub no_config: bool,
 }

@@ -35,7 +35,10 @@ pub struct ConvertArgs {
     /// Layer to show in place of the colours: `albedo`, `Ns`, `depth`, or a channel such as `Ng.X`
     #[arg(long, value_name = "NAME")]
     pub layer: Option<String>,
-    /// Values that become 0 and 1; `auto` is the least and the greatest [default: in pictures auto for a layer of one channel, -1,1 for directions, else 0,1]
+    /// Values that become 0 and 1; `auto` is the least and the greatest [default: by the layer]
+    ///
+    /// In pictures the default is `auto` for a layer of one channel, -1,1 for directions, and else
+    /// 0,1.
     #[arg(long, value_name = "LEAST,GREATEST|auto", value_parser = Range::parse, allow_hyphen_values = true)]
     pub range: Option<Range>,
     /// Tone mapping operator of pictures; an .exr stays linear [default: linear]

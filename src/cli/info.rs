@@ -49,7 +49,9 @@ pub struct InfoArgs {
     /// Meaning of the file
     #[command(flatten)]
     pub meaning: SceneSettings,
-    /// Image size for which a camera, an AO radius and light are suggested [default: the scene's, or 1280x720]
+    /// Image size in pixels that suggestions are for [default: the scene's, or 1280x720]
+    ///
+    /// A camera, an AO radius and light are suggested.
     #[arg(long, value_name = "WxH", value_parser = parse_size, conflicts_with = "no_device")]
     pub size: Option<[u32; 2]>,
     /// Device and tracer

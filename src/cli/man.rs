@@ -1,25 +1,46 @@
-//! `skylit man`: manual pages, a file for each command, for those who package skylit.
+//! `skylit man`: manual pages, a file for each command, for those who package skylit; and the same
+//! as Markdown, which is docs/reference/commands.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Command, ValueHint};
 use clap_mangen::Man;
 
-use super::help;
+use super::{help, reference};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::settings::choices;
+
+choices! {
+    /// Formats of manual pages.
+    pub enum PageFormat {
+        /// Pages of `man`: skylit.1, skylit-render.1 and so on
+        Man = "man",
+        /// Markdown: skylit.md, render.md and so on
+        Markdown = "markdown",
+    }
+}
 
 /// `skylit man`.
 #[derive(Clone, Debug, Args)]
 pub struct ManArgs {
-    /// Folder to write skylit.1, skylit-render.1 and so on into
+    /// Folder to write the pages into
     #[arg(value_hint = ValueHint::DirPath)]
     pub folder: PathBuf,
+    /// Format of the pages
+    #[arg(long, value_enum, default_value = "man")]
+    pub format: PageFormat,
 }
 
 /// Writes the pages.
 pub fn run(args: &ManArgs) -> Result<()> {
     std::fs::create_dir_all(&args.folder).map_err(|e| Error::write(&args.folder, &e))?;
+    if args.format == PageFormat::Markdown {
+        return reference::pages(help::complete_definition(), help::definition()).iter().try_for_each(|page| {
+            files::write_atomically(&args.folder.join(&page.file), |file| file.write_all(page.text.as_bytes()))
+        });
+    }
     let mut definition = help::complete_definition().disable_help_subcommand(true);
     definition.build();
     write(&definition, &args.folder)

@@ -22,6 +22,7 @@ mod image_info;
 mod info;
 mod man;
 mod rays;
+mod reference;
 mod render;
 mod scenes;
 mod stress;
@@ -78,7 +79,10 @@ Examples:
 #[derive(Debug, Parser)]
 #[command(name = "skylit", version, about, before_help = EXAMPLES, after_help = EXIT_CODES)]
 struct Cli {
-    /// Memory that files loaded together may take, like 8GiB [default: half of this machine's, and 1 GiB and 256 bytes a byte read]
+    /// Memory that files loaded together may take, like 8GiB [default: half of this machine's]
+    ///
+    /// Without the option they may also take no more than 1 GiB and 256 bytes for each byte that is
+    /// read.
     #[arg(long, global = true, value_name = "SIZE", hide_short_help = true, help_heading = "Files")]
     memory_limit: Option<ByteSize>,
     #[command(subcommand)]
@@ -92,33 +96,36 @@ enum Command {
     /// Look at a scene in a window while it is traced, or at images
     #[cfg(feature = "viewer")]
     View(Box<view::ViewArgs>),
-    /// Describe a scene (geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device), or an image
+    /// Describe a scene or an image, and suggest options
+    ///
+    /// Of a scene it shows geometry, materials, textures, lights, a camera and an AO radius that
+    /// fit, memory and time on this device.
     Info(info::InfoArgs),
-    /// Describe the hierarchy that rays traverse: cost, overlap and leaves level by level, and what rays cost in it
+    /// Describe the hierarchy that rays traverse: cost by level, and what rays cost in it
     Bvh(Box<bvh::BvhArgs>),
     /// List the built-in scenes
     Scenes(args::ScenesArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
     Export(args::ExportArgs),
-    /// Bake ambient occlusion into a model: textures or vertex colours; or other maps of its surfaces as images
+    /// Bake ambient occlusion into textures or vertex colours of a model, or other maps as images
     #[cfg(feature = "bake")]
     Bake(Box<bake::BakeArgs>),
     /// Write an image in other formats: exposed, tone mapped, or one of its layers
     Convert(convert::ConvertArgs),
     /// Check whether two images agree
     Diff(args::DiffArgs),
-    /// Compare images, or renders made on the spot, with a reference: metrics, difference pictures, an HTML report
+    /// Compare images or renders with a reference: metrics, difference pictures, an HTML report
     #[cfg(feature = "compare")]
     Compare(Box<compare::CompareArgs>),
-    /// Render the frames of a manifest and compare each with its golden image: for continuous integration
+    /// Compare the frames of a manifest with their golden images: for continuous integration
     #[cfg(feature = "verify")]
     Verify(Box<verify::VerifyArgs>),
-    /// Benchmark ray throughput, frames in real time and path tracing: time against error, beside other programs
+    /// Benchmark rays, frames in real time and path tracing, beside other programs
     #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
     /// Trace a set of rays against a mesh and report the ray throughput
     Rays(args::RaysArgs),
-    /// Try to break numerics: checks of tracers, sampling, films and filters with figures and bounds, or of a scene of yours
+    /// Check numerics of tracers, sampling, films and filters, or of a scene of yours
     Stress(Box<stress::StressArgs>),
     /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
     Doctor(args::DoctorArgs),

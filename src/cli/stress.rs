@@ -29,7 +29,7 @@ Exit codes:
   1    a check fails
 
 What a file holds is reported, and never fails; what skylit does with it is held against bounds.
-docs/stress.md has every check, its bound, and its figure on each tracer.";
+docs/results/stress.md has every check, its bound, and its figure on each tracer.";
 
 /// `skylit stress`.
 #[derive(Clone, Debug, Args)]
@@ -44,10 +44,15 @@ pub struct StressArgs {
     /// A hundred times as many rays and samples, on all tracers: takes hours on a CPU driver
     #[arg(long)]
     pub full: bool,
-    /// Only these sections, separated by commas: scale, watertight, degenerate, contact, lengths, transparency, sampling, long-runs, display, determinism
+    /// Only these sections, separated by commas [default: all]
+    ///
+    /// Sections are scale, watertight, degenerate, contact, lengths, transparency, sampling,
+    /// long-runs, display and determinism.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub sections: Vec<String>,
-    /// Only checks whose name contains this text, as a line of the output has it; may be given several times
+    /// Only checks whose name contains this text; may be given several times
+    ///
+    /// A line of the output has the name.
     #[arg(long, value_name = "TEXT")]
     pub checks: Vec<String>,
     /// Write a report, an HTML page that needs no network, into this folder

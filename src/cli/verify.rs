@@ -27,7 +27,7 @@ Exit codes:
   2    a frame, or all of them, could not be rendered or judged; the others were
   4    the results (--junit, --html) or a golden image cannot be written
 
-docs/ci.md describes the manifest, frames.toml, and what makes images differ between machines.
+docs/reference/frames.md describes the manifest, frames.toml, and what makes images differ between machines.
 Files of defaults (skylit.toml) are not read: golden images do not depend on them.";
 
 const EXAMPLES: &str = "\
@@ -49,7 +49,10 @@ pub struct VerifyArgs {
     /// Only the I-th of N parts of the frames, for machines that share the work
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
-    /// Render with these tracers, which the device must have, in place of those that the manifest names: auto, all, or some of pipeline, query, compute, separated by commas
+    /// Tracers in place of the manifest's: auto, all, or some of pipeline, query, compute, by
+    /// commas
+    ///
+    /// The device must have them.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub tracers: Vec<String>,
     /// Seed of frames that have a Z-test alone: their verdict must not depend on it
@@ -67,11 +70,15 @@ pub struct VerifyArgs {
     /// Write the results as JUnit XML
     #[arg(long, value_name = "FILE.xml", value_hint = ValueHint::FilePath)]
     pub junit: Option<PathBuf>,
-    /// Write a report, an HTML page that needs no network, into this folder: frames that differ beside their golden images
+    /// Write a report into this folder: a page that needs no network
+    ///
+    /// It has frames that differ beside their golden images.
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub html: Option<PathBuf>,
-    /// Refuse frames whose scenes, settings, environments, camera paths or golden images lie outside of the manifest's folder, and scenes that refer to files there: for
-    /// manifests of strangers
+    /// Refuse frames with files outside of the manifest's folder: for manifests of strangers
+    ///
+    /// Scenes, settings, environments, camera paths and golden images count, and the files that
+    /// scenes refer to.
     #[arg(long)]
     pub confine: bool,
     /// Device

@@ -35,10 +35,15 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct ViewArgs {
-    /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them) [default: the viewer asks]; or images: .exr, .hdr, .png, .jpg, .webp
+    /// Scene (.gltf, .glb, .obj, .brhan or builtin:NAME), or images [default: the viewer asks]
+    ///
+    /// `skylit scenes` lists the built-in scenes. Images are .exr, .hdr, .png, .jpg and .webp
+    /// files.
     #[arg(value_name = "SCENE|IMAGE", value_hint = ValueHint::FilePath)]
     pub files: Vec<String>,
-    /// Read settings from this file, .json or .toml, which the viewer or a person has written; options given here replace what it says
+    /// Read settings from this file, .json or .toml; options replace what it says
+    ///
+    /// The viewer saves such files.
     #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
     /// Which files the scene may name.
@@ -47,15 +52,17 @@ pub struct ViewArgs {
     /// Files of defaults.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// Frame rate to hold while something moves, by a lower resolution of the image; 0: full resolution always [default: 10 on CPUs, 30 on GPUs]
+    /// Frame rate to hold by a lower resolution [default: 10 on CPUs, 30 on GPUs]
+    ///
+    /// The resolution is lower while something moves. 0 keeps the full resolution.
     #[arg(long, value_name = "N", value_parser = parse_frame_rate)]
     pub frame_rate: Option<f64>,
     /// Who paints the window [default: Vulkan on GPUs, the CPU on CPU drivers]
     #[arg(long, value_enum, hide_short_help = true)]
     pub painter: Option<Painter>,
-    /// Run this script without a window (docs/viewer.md), and end
+    /// Run this script without a window, and end
     #[cfg(feature = "probes")]
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide_short_help = true)]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide = true)]
     pub headless_script: Option<PathBuf>,
     /// What is shown first, and how; --size is the window's
     #[command(flatten)]

@@ -23,8 +23,11 @@ settings! {
     /// Light besides the scene's.
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
-        /// Environment light: an equirectangular map (.hdr, .exr, .png, .jpg, .webp), a radiance
-        /// R,G,B, a clear `sky`, `studio`, `softbox`, `overcast`, or `none` [default: the scene's]
+        /// Environment light: a map, a radiance R,G,B, a built-in one, or `none` [default: the
+        /// scene's]
+        ///
+        /// A map is an equirectangular .hdr, .exr, .png, .jpg or .webp, or a folder with the six
+        /// faces of a cube. Built in are a clear `sky`, `studio`, `softbox` and `overcast`.
         ///
         /// `sky:ELEVATION,AZIMUTH,TURBIDITY` says where the sun is, -6 to 90 degrees above the
         /// horizon and in degrees clockwise from -z, and how hazy the air is, 1 to 10; numbers may

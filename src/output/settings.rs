@@ -106,16 +106,25 @@ settings! {
     /// How image files are written.
     "Files"
     pub struct FileSettings {
-        /// Bits per channel of .png outputs; of frames in real time, 16 are for --show result [default: 8]
+        /// Bits per channel of .png outputs [default: 8]
+        ///
+        /// Of frames in real time, 16 are for --show result.
         png_bits: Option<PngBits>, option(value_enum), applies(AppliesTo::ALL);
-        /// Transfer function of .png outputs, linear with --png-bits 16 or there will be bands; of frames in real time, linear is for --show result
-        /// [default: srgb]
+        /// Transfer function of .png outputs [default: srgb]
+        ///
+        /// Linear values need --png-bits 16, or there will be bands. Of frames in real time, linear
+        /// is for --show result.
         png_encoding: Option<PngEncoding>, option(value_enum), applies(AppliesTo::ALL);
-        /// Background of .png, .webp, .jpg and .apng outputs: a linear colour from 0 to 1, or `transparent`, which keeps alpha (not in .jpg) [default: 0,0,0]
+        /// Background of pictures: a linear colour from 0 to 1, or `transparent` [default: 0,0,0]
+        ///
+        /// It is for .png, .webp, .jpg and .apng outputs. `transparent` keeps alpha, which a .jpg
+        /// cannot have.
         background: Option<Background>, option(value_name = "R,G,B|transparent"), applies(AppliesTo::ALL);
         /// Quality of .jpg outputs, 1 to 100 [default: 90]
         jpeg_quality: Option<u32>, option(value_name = "Q", value_parser = clap::value_parser!(u32).range(1..=100)), applies(AppliesTo::ALL);
-        /// Store colours, alpha, normals and albedo of .exr outputs as 16-bit floats (half); depths, positions, ids, samples and variances keep 32 bits
+        /// Store colours, alpha, normals and albedo of .exr outputs as 16-bit floats (half)
+        ///
+        /// Depths, positions, ids, samples and variances keep 32 bits.
         exr_half: bool, option(), applies(AppliesTo::ALL);
         /// Compression of .exr outputs; lossless but for pxr24, b44 and b44a [default: zip]
         exr_compression: Option<ExrCompression>, option(value_enum), applies(AppliesTo::ALL);

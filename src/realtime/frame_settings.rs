@@ -105,7 +105,9 @@ settings! {
         animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(TIMELINE);
         /// Hold the animation at this time, in seconds since its start [default: frames play it]
         time: Option<f64>, option(value_name = "SECONDS", value_parser = parse_playback_time), applies(TIMELINE);
-        /// Animate the camera along the key frames of a file (docs/sequences.md)
+        /// Animate the camera along the key frames of a file
+        ///
+        /// docs/guide/animation.md describes the file.
         camera_path: Option<PathBuf>,
             option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),
             applies(TIMELINE);
@@ -113,9 +115,14 @@ settings! {
         orbit: Option<u32>,
             option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
             applies(TIMELINE), basic;
-        /// Warm-up frames, identical to the first, that are rendered and discarded [default: for a single frame, until histories are full; else 0]
+        /// Warm-up frames that are rendered and discarded [default: for one frame until histories
+        /// are full]
+        ///
+        /// They are identical to the first frame. Sequences have none by default.
         warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
-        /// Frames of the sequence before the first that are rendered and discarded, so that it begins as it goes on; an orbit has them before frame 0, too
+        /// Frames before the first that are rendered and discarded [default: 0]
+        ///
+        /// The sequence then begins as it goes on. An orbit has them before frame 0, too.
         lead_in: Option<u32>, option(value_name = "N"), applies(FRAMES);
         /// AO technique [default: the preset's]
         technique: Option<Technique>, option(value_enum), applies(FRAMES);
@@ -134,9 +141,10 @@ settings! {
         filter: Option<FilterKind>, option(value_enum), applies(FRAMES);
         /// Maximum filter radius in pixels [default: the preset's]
         filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES), research;
-        /// Antialias edges by samples at different places within the pixels from frame to frame [default: the preset's]
+        /// Antialias edges, by samples at other places of pixels in each frame [default: the
+        /// preset's]
         antialias: Option<Antialias>, option(value_enum), applies(FRAMES);
-        /// What the image does while neither the camera nor the scene moves [default: converge where it is antialiased, and of light]
+        /// What the image does while nothing moves [default: converge if antialiased, and of light]
         at_rest: Option<AtRest>, option(value_enum), applies(FRAMES);
         /// What .png and .apng outputs show [default: result]
         show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);

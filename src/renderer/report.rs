@@ -163,6 +163,11 @@ impl Setup {
         record.as_object().cloned().unwrap_or_default()
     }
 
+    /// The outcome of what settings left to the scene, as options to append to a line.
+    fn chosen_text(&self) -> String {
+        self.chosen.as_ref().map_or_else(String::new, |options| format!("; chosen: {options}"))
+    }
+
     /// The parts of the run that took half a millisecond or more.
     fn seconds_line(&self, seconds: &Seconds) -> String {
         let parts = seconds.parts.iter().filter(|p| p.1 >= 0.000_5).map(|&(name, s)| match name {
@@ -179,6 +184,8 @@ impl Setup {
 #[derive(Clone, Debug)]
 pub struct FilmReport {
     lines: Vec<String>,
+    /// How large the error of pixels is, in a line; `None` if the film does not know.
+    error: Option<String>,
     explanations: Vec<String>,
     record: Value,
 }
@@ -194,12 +201,11 @@ impl FilmReport {
     ) -> Self {
         let (min, mean, max) = image.film.samples_range();
         let estimated = image.film.estimated_rmse();
-        let mut lines = Vec::new();
-        if let (Some(before), Some(path)) = (before, &options.resume) {
-            lines.push(format!("resumed {} from {before} samples per pixel", path.display()));
-        }
+
+        // how exact the image is: by what bounds its error, else by the variance of samples
+        let mut errors = Vec::new();
         if let (Some(tiles), Some(target)) = (image.converged, options.target_rmse) {
-            lines.push(format!(
+            errors.push(format!(
                 "estimated rmse {} (target {}): {} of {} tiles done; {min} to {max} samples per pixel, {mean:.1} on average",
                 significant(estimated, 3),
                 significant(target, 3),
@@ -208,7 +214,17 @@ impl FilmReport {
             ));
         }
         let quality = options.quality.and_then(|quality| QualityReport::new(quality, image));
-        lines.extend(quality.iter().flat_map(QualityReport::lines));
+        errors.extend(quality.iter().flat_map(QualityReport::lines));
+        let estimate = (estimated.is_finite() && estimated > 0.0)
+            .then(|| format!("estimated rmse {} of a pixel", significant(estimated, 3)));
+        let error = errors.first().cloned().or(estimate);
+
+        // all lines, and the record
+        let mut lines = Vec::new();
+        if let (Some(before), Some(path)) = (before, &options.resume) {
+            lines.push(format!("resumed {} from {before} samples per pixel", path.display()));
+        }
+        lines.extend(errors);
         if !options.intervals && hints.save_intervals.iter().any(|&n| n < spp) {
             lines.push("the scene requests intermediate images: add --intervals".into());
         }
@@ -222,7 +238,7 @@ impl FilmReport {
             "samples_before": before,
         });
         let explanations = quality.map(|q| q.explanations()).unwrap_or_default();
-        Self { lines, explanations, record }
+        Self { lines, error, explanations, record }
     }
 }
 
@@ -285,7 +301,31 @@ pub struct StillReport {
 }
 
 impl StillReport {
-    /// Lines for people. `outputs` names the image files; `explain` adds lines about skipped work.
+    /// At most three lines for people: what was rendered, how long it took, how exact it is.
+    /// `outputs` names the image files.
+    pub fn summary(&self, outputs: &str) -> Vec<String> {
+        let [width, height] = self.size;
+        let samples = spp_text(self.spp, self.most_spp);
+        let stopped =
+            if self.stopped_early { format!(" of {}, stopped early", self.requested_spp) } else { String::new() };
+        let trace = self.seconds.parts.iter().find(|(name, _)| *name == "trace");
+        let trace = trace.map_or_else(String::new, |(_, s)| format!(", {s:.3} of them tracing"));
+        let error = self.film.error.as_ref().map_or_else(String::new, |error| format!("; {error}"));
+        let denoised = if self.denoise.is_some() { "; denoised, which is biased" } else { "" };
+        vec![
+            format!(
+                "{outputs}: {width}x{height}, {samples} spp{stopped}, {}, on {}{}",
+                self.integrator,
+                self.setup.device,
+                self.setup.chosen_text()
+            ),
+            format!("{:.3} seconds{trace}", self.seconds.total),
+            format!("mean {} {:.5}{}{error}{denoised}", self.quantity, self.mean, error_text(self.mean_standard_error)),
+        ]
+    }
+
+    /// All lines for people. `outputs` names the image files; `explain` adds lines about skipped
+    /// work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let [width, height] = self.size;
         let mut lines = vec![format!(
@@ -499,7 +539,26 @@ impl FramesReport {
         [sum(|s| s.primary_rays), sum(|s| s.occlusion_rays), sum(|s| s.skipped_rays)]
     }
 
-    /// Lines for people. `outputs`: names of the files; `explain`: add lines about skipped work.
+    /// Three lines for people: what was rendered, how long it took, what it shows on average.
+    /// `outputs` names the files.
+    pub fn summary(&self, outputs: &str) -> Vec<String> {
+        let kept = self.frames.iter().filter(|f| f.kept).count();
+        let frames = if kept == 1 { "1 frame".to_owned() } else { format!("{kept} frames") };
+        vec![
+            format!(
+                "{outputs}: {frames} of {}, {}, on {}{}",
+                self.technique_text(),
+                self.preset,
+                self.setup.device,
+                self.setup.chosen_text()
+            ),
+            format!("{:.3} seconds; {}", self.seconds.total, self.time_line()),
+            format!("mean {} {:.5} over the scene's pixels", self.quantity, self.mean),
+        ]
+    }
+
+    /// All lines for people. `outputs`: names of the files; `explain`: add lines about skipped
+    /// work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let (kept, all) = (self.frames.iter().filter(|f| f.kept).count(), self.frames.len());
         let [primary, occlusion, skipped] = self.rays();

@@ -46,14 +46,19 @@ settings! {
     pub struct ImageSettings {
         /// Samples per pixel [default: the scene's, or 16]
         spp: Option<u32>, option(value_parser = clap::value_parser!(u32).range(1..=1 << 24)), applies(AppliesTo::STILLS), basic;
-        /// Image size in pixels [default: the scene's, or 1280x720, or as many pixels in the aspect ratio of the scene's camera]
+        /// Image size in pixels [default: the scene's, or 1280x720]
+        ///
+        /// Where the scene's camera has an aspect ratio, the default has about as many pixels in
+        /// that ratio.
         size: Option<[u32; 2]>, option(value_name = "WxH", value_parser = parse_size), applies(AppliesTo::ALL), basic;
         /// Seed of the sampler [default: 0]
         seed: Option<u32>, option(value_name = "N"), applies(AppliesTo::ALL);
         /// Stop after this time and keep the image so far (at least one sample per pixel)
         time_limit: Option<f64>,
             option(value_name = "SECONDS", value_parser = parse_time, allow_hyphen_values = true), applies(AppliesTo::STILLS);
-        /// Pixel reconstruction filter, by importance sampling; frames in real time have `box`, or `centre` with --antialias off [default: box]
+        /// Pixel reconstruction filter, by importance sampling [default: box]
+        ///
+        /// Frames in real time have `box`, or `centre` with --antialias off.
         pixel_filter: Option<PixelFilter>, option(value_enum), applies(AppliesTo::STILLS);
         /// Denoise the final image (biased) [default: off; without METHOD: auto]
         ///
@@ -69,7 +74,10 @@ settings! {
     /// The camera.
     "Camera"
     pub struct CameraSettings {
-        /// Camera of the scene, by index or name [default: the first one, or one that shows most of the scene, or of a room from inside]
+        /// Camera of the scene, by index or name [default: the first, or one that shows the scene]
+        ///
+        /// Where the scene has no camera, one is chosen that shows most of the scene, or of a room
+        /// from inside.
         camera: Option<String>, option(value_name = "INDEX|NAME", conflicts_with = "eye"), applies(AppliesTo::ALL), basic;
         /// Look at the whole scene from one side, or at a room from inside, whatever cameras the scene has
         view: Option<ViewName>, option(value_enum, conflicts_with_all = ["eye", "camera"]), applies(AppliesTo::ALL), basic;
@@ -84,8 +92,11 @@ settings! {
             option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL);
         /// Vertical field of view in degrees [default: the camera's, or 45]
         fov_y: Option<f64>, option(value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
-        /// Clipping planes: what the camera sees lies between these distances along the view direction, in scene units; FAR may be `inf`, and `none` clips nothing
-        /// [default: those of the scene's camera, or none]
+        /// Clipping planes, in scene units; FAR may be `inf` [default: those of the camera, or
+        /// none]
+        ///
+        /// The camera sees what lies between these distances along the view direction. `none` clips
+        /// nothing.
         clip: Option<ClipPlanes>, option(value_name = "NEAR,FAR"), applies(AppliesTo::ALL);
     }
 }
@@ -195,7 +206,11 @@ settings! {
     pub struct PictureSettings {
         /// Tone mapping operator of .png outputs [default: linear]
         tone_map: Option<ToneMap>, option(value_enum), applies(TONE_MAPPED), basic;
-        /// Exposure of .png outputs, in stops [default: 0, or chosen for a still that shows the scene's own light, if that is far from what a display shows]
+        /// Exposure of .png outputs, in stops [default: 0, or chosen for scenes far from middle
+        /// grey]
+        ///
+        /// It is chosen for a still that shows the scene's own light, if that is far from what a
+        /// display shows.
         exposure: Option<f64>, option(value_name = "EV", value_parser = parse_number, allow_hyphen_values = true), applies(TONE_MAPPED);
     }
 }
@@ -211,15 +226,23 @@ settings! {
     /// The film: what it starts from, when it is saved, when it is good enough.
     "Film of stills"
     pub struct FilmSettings {
-        /// Resume a render that was saved with --resumable, up to --spp samples in all; the result is bit-identical to an uninterrupted render. All other settings
-        /// must be the same
+        /// Resume a render that was saved with --resumable, up to --spp samples in all
+        ///
+        /// The result is bit-identical to an uninterrupted render. All other settings must be the
+        /// same.
         resume: Option<PathBuf>, option(value_name = "FILE.exr", value_hint = clap::ValueHint::FilePath), applies(AppliesTo::STILLS);
-        /// Save the state of the film in .exr outputs (layer `state`), for --resume; implied by --resume and --intervals
+        /// Save the state of the film in .exr outputs (layer `state`), for --resume
+        ///
+        /// --resume and --intervals imply it.
         resumable: bool, option(), applies(AppliesTo::STILLS);
-        /// Also save intermediate images, as NAME.0016.exr, at every power of two of samples and at those that the scene names
+        /// Also save intermediate images, as NAME.0016.exr, at every power of two of samples
+        ///
+        /// They are saved at the samples that the scene names, too.
         intervals: bool, option(), applies(AppliesTo::STILLS);
-        /// Adaptive sampling: stop sampling an 8x8 tile once its estimated standard error and its neighbours' are at most E (radiance), tested at powers of two
-        /// from 64 samples on. --spp is then the maximum
+        /// Adaptive sampling: stop where the standard error is at most E, in radiance
+        ///
+        /// A tile of 8x8 pixels is finished once its estimated standard error and its neighbours'
+        /// are at most E, tested at powers of two from 64 samples on. --spp is then the maximum.
         target_rmse: Option<f64>, option(value_name = "E", value_parser = parse_target, allow_hyphen_values = true), applies(AppliesTo::STILLS);
         /// As many samples as a display needs: draft, good or final
         ///

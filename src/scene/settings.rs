@@ -37,10 +37,12 @@ settings! {
     pub struct SceneSettings {
         /// What `d` below 1 means in an .mtl file without anything else that says glass [default: alpha]
         mtl_dissolve: Option<MtlDissolve>, option(value_enum), applies(AppliesTo::ALL);
-        /// Variant of the materials, by its name or its number from 0, of files that have several [default: none]
+        /// Variant of the materials, by its name or its number from 0 [default: none]
         variant: Option<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
-        /// Values of a material in place of the file's, by its name or its number from 0, like
-        /// "Red plastic base_color=0.8,0.1,0.1 roughness=0.3"; may be repeated
+        /// Replace values of a material, like "Red plastic roughness=0.3 metallic=1"; may be
+        /// repeated
+        ///
+        /// The material is given by its name or its number from 0.
         ///
         /// Keys: base_color=R,G,B (linear, 0 to 1), metallic, roughness, transmission (0 to 1) and
         /// emission=R,G,B (linear radiance). Textures multiply them, as they do the file's values.

@@ -134,7 +134,10 @@ settings! {
         traversal: Option<Kernel>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Ray-triangle intersection test of the compute tracer [default: watertight]
         triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL), research;
-        /// BVH build of the compute tracer: a quality, or for --traversal nearest and direction rules for rays that are known [default: auto]
+        /// BVH build of the compute tracer [default: auto]
+        ///
+        /// It is a quality, or for --traversal nearest and direction a rule for rays that are
+        /// known.
         build: Option<BuildMethod>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Direction of the rays that --build sah-spfh and pah... are for
         build_direction: Option<DVec3>,
@@ -142,8 +145,9 @@ settings! {
         /// Point through which the rays pass that --build sah-spfh and pah... are for
         build_eye: Option<DVec3>,
             option(value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true), applies(AppliesTo::ALL), research;
-        /// Cache the compute tracer's BVHs in this folder, and reuse them for the same geometry
-        /// [env: SKYLIT_BVH_CACHE]
+        /// Cache the compute tracer's BVHs in this folder, and reuse them [env: SKYLIT_BVH_CACHE]
+        ///
+        /// A BVH is reused for the same geometry.
         bvh_cache: Option<PathBuf>, option(value_name = "DIR", value_hint = clap::ValueHint::DirPath), applies(AppliesTo::ALL);
         /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
         device: Option<String>, option(value_name = "INDEX|NAME"), applies(AppliesTo::ALL), basic;

@@ -150,7 +150,7 @@ fn gpu_commands_of_ao_vs_path_have_the_error_that_it_finds() {
     let found = rmse(&images[0], &images[1]);
     assert!((found / promised - 1.0).abs() < 0.25, "{found}, promised is {promised}: {record}");
     // the last of options that are given twice counts
-    let text = run(&[&path[..], &["--spp", "1", "--max-depth", "1"]].concat());
+    let text = run(&[&path[..], &["--spp", "1", "--max-depth", "1", "-v"]].concat());
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     assert!(text.contains("1 spp, path") && text.contains("(limit 1)"), "{text}");
 }

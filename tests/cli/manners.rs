@@ -1,5 +1,7 @@
 //! What a command line should be able to do beside its work: help, version, completions, manual pages, progress, and times that add up.
 
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
@@ -176,6 +178,24 @@ fn manual_pages() {
     refuses(&["man", &format!("{file}/below")], 4, "file/below");
 }
 
+/// The pages of docs/reference/commands are those of the program.
+#[test]
+fn pages_of_the_reference_are_up_to_date() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = place(&dir, "pages");
+    assert!(stdout(&["man", &folder, "--format", "markdown"]).is_empty());
+    let pages = |folder: &Path| -> BTreeMap<String, String> {
+        let files = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path());
+        files.map(|f| (f.file_name().unwrap().to_string_lossy().into(), std::fs::read_to_string(&f).unwrap())).collect()
+    };
+    let made = pages(folder.as_ref());
+    let kept = pages(&Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/commands"));
+    let differ: Vec<_> = made.keys().chain(kept.keys()).filter(|name| made.get(*name) != kept.get(*name)).collect();
+    assert!(differ.is_empty(), "pages differ from the help of the program: run `just reference` ({differ:?})");
+    // all commands, and nothing of the tests' build
+    assert!(made.len() > 20 && !made["view.md"].contains("headless-script"), "{:?}", made.keys());
+}
+
 /// The parts of a run add up to its total, and little of it has no name.
 #[test]
 fn gpu_times_add_up() {
@@ -206,8 +226,15 @@ fn gpu_times_add_up() {
         // what the program does beside: reading its arguments, composing the report
         assert!(of("other") < 0.05 + 0.05 * total, "{seconds}");
     }
-    let line = String::from_utf8(run(&still).stdout).unwrap();
+    let text = |more: &[&str]| String::from_utf8(run(&[&still[..], more].concat()).stdout).unwrap();
+    let line = text(&["--verbose"]);
     assert!(line.contains(" seconds: open ") && line.contains("(load 0."), "{line}");
+    // what, how long, how sure
+    let summary = text(&[]);
+    let lines: Vec<&str> = summary.lines().collect();
+    let [what, time, error] = lines[..] else { panic!("{summary}") };
+    assert!(what.contains(": 96x64, 2 spp, path, on ") && time.contains(" seconds, "), "{summary}");
+    assert!(error.starts_with("mean radiance ") && error.contains("; estimated rmse "), "{summary}");
 }
 
 /// A mean of one sample has no error, and of more it has one.

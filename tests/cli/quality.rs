@@ -124,8 +124,11 @@ fn gpu_quiet_tiles_have_fewer_samples() {
 
     // twice the same, and people are told as well
     let base = ["--size", "64x48", "--no-config", "-o", &again, "--quality", "draft"];
-    let text = String::from_utf8(run(&[&["render"], &scene[..], &base[..]].concat()).stdout).unwrap();
-    assert!(text.contains("quality draft: noise on a display is estimated as "), "{text}");
+    let text =
+        |more: &[&str]| String::from_utf8(run(&[&["render"], &scene[..], &base[..], more].concat()).stdout).unwrap();
+    let short = text(&[]);
+    assert!(short.contains("quality draft: noise on a display is estimated as "), "{short}");
+    let text = text(&["--verbose"]);
     assert!(text.contains("of 48 tiles have 256 samples, the most, and noise above the bound"), "{text}");
     let bytes = |path: &str| std::fs::read(path).unwrap();
     assert!(bytes(&exr) == bytes(&again), "other bytes");

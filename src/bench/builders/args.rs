@@ -17,12 +17,19 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct BenchBuildersArgs {
-    /// Scenes whose images' rays are measured [default: Sponza and the dragon where they are available, and builtin:atrium]
+    /// Scenes whose images' rays are measured [default: Sponza, the dragon and builtin:atrium]
+    ///
+    /// Sponza and the dragon are measured where they are available.
     pub scenes: Vec<String>,
-    /// Influence areas by scene, as Falcone (2024) placed them, or `none` [default: falcone_influence_areas.json in the folder `references` beside that of the shared scenes, if it is there]
+    /// Influence areas by scene, as Falcone (2024) placed them, or `none` [default: a shared file]
+    ///
+    /// The default is falcone_influence_areas.json in the folder `references` beside that of the
+    /// shared scenes, if it exists.
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
     pub areas: Option<String>,
-    /// Results of his to show beside: scene, area, orient, variant and costs in CSV [default: falcone_runs.csv beside the areas, if it is there]
+    /// Results of Falcone (2024) to show beside [default: falcone_runs.csv beside the areas]
+    ///
+    /// The file has scene, area, orient, variant and costs in CSV.
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
     pub runs: Option<PathBuf>,
     /// Width of the images whose rays are measured, 16:9 [default: 256; 64 with --quick]

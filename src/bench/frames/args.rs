@@ -105,14 +105,19 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct BenchFramesArgs {
-    /// Scenes: as `render` takes them, interior (the built-in atrium with one lamp), or room (a box appears and slides)
-    /// [default: of light the Cornell box with matte blocks, a mirror and a sphere of glass, interior, parade, and Sponza and FlightHelmet if available; of ambient occlusion
-    /// all well-known scenes that are available, two large built-in ones, room and parade]
+    /// Scenes, as `render` takes them, interior, or room [default: well-known and built-in ones]
+    ///
+    /// interior is the built-in atrium with one lamp; in room a box appears and slides. The default
+    /// of light is the Cornell box with matte blocks, a mirror and a sphere of glass, interior,
+    /// parade, and Sponza and FlightHelmet if available. That of ambient occlusion is all
+    /// well-known scenes that are available, two large built-in ones, room and parade.
     pub scenes: Vec<String>,
     /// Integrator [default: path]
     #[arg(long, value_name = "NAME", value_parser = integrators::parser())]
     pub integrator: Option<IntegratorName>,
-    /// Presets, separated by commas; gtao is balanced with GTAO (screen space) instead of rays [default: all that the integrator has, but reference]
+    /// Presets, separated by commas [default: all that the integrator has, but reference]
+    ///
+    /// gtao is balanced with GTAO (screen space) instead of rays.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = candidate_names())]
     pub presets: Vec<String>,
     /// Parts, separated by commas [default: all; for named scenes all but bounces and structures]
@@ -136,7 +141,9 @@ pub struct BenchFramesArgs {
     /// Runs of a still camera, with seeds one after another, whose errors are averaged
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub runs: u32,
-    /// Paths, or occlusion rays, per pixel of the reference of a still camera; a quarter for those of frames in motion [default: 1024; 128 with --quick]
+    /// Paths, or occlusion rays, per pixel of the reference [default: 1024; 128 with --quick]
+    ///
+    /// References of frames in motion have a quarter.
     #[arg(long, visible_alias = "reference-rays", value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     pub reference_paths: Option<u32>,
     /// Timed updates of each acceleration structure [default: 9; 3 with --quick]
@@ -145,10 +152,16 @@ pub struct BenchFramesArgs {
     /// Falloff of ambient occlusion with distance
     #[arg(long, value_enum, default_value = "exponential")]
     pub ao_falloff: FalloffChoice,
-    /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
+    /// Environment map for scenes without lights [default: the shared sun map, or a built-in one]
+    ///
+    /// It is an equirectangular .hdr or .exr.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
-    /// Peers that render paths, beside a still camera: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
+    /// Peers that render paths: a file, or `none` [default: benches/peers.toml of this version]
+    ///
+    /// They are measured where the camera stands still. Commands of the file are run.
+    /// benches/peers.toml in the working folder is taken by default if it is the one of this
+    /// version.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Tracer

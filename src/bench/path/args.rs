@@ -36,8 +36,11 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct BenchPathArgs {
-    /// Scenes: as `render` takes them, or cornell (the box with Lambertian walls), sphere-diffuse, sphere-metal, sphere-mirror, sphere-glass
-    /// [default: cornell, FlightHelmet and Sponza if available, and the first three spheres]
+    /// Scenes, as `render` takes them, or cornell, sphere-diffuse, ... [default: well-known ones]
+    ///
+    /// cornell is the box with Lambertian walls; sphere-diffuse, sphere-metal, sphere-mirror and
+    /// sphere-glass are a sphere alone. The default is cornell, FlightHelmet and Sponza if
+    /// available, and the first three spheres.
     pub scenes: Vec<String>,
     /// Sampling strategies of skylit, separated by commas [default: all]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
@@ -48,13 +51,15 @@ pub struct BenchPathArgs {
     /// Timed images of each sample count, interleaved, after one warm-up [default: 5; 2 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: Option<u32>,
-    /// Multiply the sample count by four until an image takes about this long [default: 4; 0.3 with --quick]
+    /// Quadruple samples until an image takes about this long [default: 4; 0.3 with --quick]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub seconds: Option<Duration>,
     /// Time spent on the reference image of each engine and scene [default: 15 times --seconds]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub reference_seconds: Option<Duration>,
-    /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
+    /// Environment map for scenes without lights [default: the shared sun map, or a built-in one]
+    ///
+    /// It is an equirectangular .hdr or .exr.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
     /// Tracer
@@ -63,7 +68,10 @@ pub struct BenchPathArgs {
     /// Build quality of the compute tracer's hierarchy
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Peers to compare with: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
+    /// Peers to compare with: a file, or `none` [default: benches/peers.toml of this version]
+    ///
+    /// Commands of the file are run. benches/peers.toml in the working folder is taken by default
+    /// if it is the one of this version.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Options of every benchmark

@@ -29,10 +29,14 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(before_help = EXAMPLES)]
 pub struct BenchRaysArgs {
-    /// Scenes, as `render` takes them [default: the well-known scenes that are available, and built-in ones of 10^4 to 2.5*10^7
-    /// triangles]
+    /// Scenes, as `render` takes them [default: well-known and built-in ones]
+    ///
+    /// The default is the well-known scenes that are available, and built-in ones of 10^4 to
+    /// 2.5*10^7 triangles.
     pub scenes: Vec<String>,
-    /// Kernels of skylit, separated by commas [default: all that the device supports; slow ones on small scenes only]
+    /// Kernels of skylit, separated by commas [default: all that the device supports]
+    ///
+    /// Slow ones are measured on small scenes only, unless they are named.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = kernel_names())]
     pub kernels: Vec<String>,
     /// Ray streams, separated by commas [default: all]
@@ -41,26 +45,36 @@ pub struct BenchRaysArgs {
     /// Timed repeats of each contestant, interleaved, after one warm-up [default: 7; 3 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: Option<u32>,
-    /// Approximate number of rays per set, one per pixel of a 16:9 image [default: 921600; 57600 with --quick]
+    /// Approximate number of rays per set [default: 921600; 57600 with --quick]
+    ///
+    /// They are one per pixel of a 16:9 image.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
     pub rays: Option<u32>,
     /// Build quality of the compute tracer's hierarchies
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Length of ambient occlusion rays, in scene units [default: a suitable length for well-known scenes, else unlimited]
+    /// Length of ambient occlusion rays, in scene units [default: by the scene, else unlimited]
+    ///
+    /// Well-known scenes have suitable lengths by default.
     #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: Option<f64>,
     /// Also compare all hits with those of the first kernel; fail on any difference beyond rounding
     #[arg(long)]
     pub check: bool,
-    /// Instead of measuring, send rays at shared edges and vertices of closed meshes through every contestant, as many as --rays says in all, and count those that get through and those
-    /// whose answers the double-precision oracle does not explain; fail on any of the compute tracer's
+    /// Instead of measuring, send rays at shared edges and vertices, and count leaks
+    ///
+    /// As many rays as --rays says in all go at edges and vertices of closed meshes through every
+    /// contestant. Those that get through are counted, and those whose answers the double-precision
+    /// oracle does not explain; any of the compute tracer's fails the run.
     #[arg(long, conflicts_with_all = ["scenes", "streams", "repeats", "baseline", "check", "alpha", "ao_radius"])]
     pub edges: bool,
     /// Keep alpha masks; otherwise they are treated as opaque, because peers do not support them
     #[arg(long)]
     pub alpha: bool,
-    /// Peers to compare with: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
+    /// Peers to compare with: a file, or `none` [default: benches/peers.toml of this version]
+    ///
+    /// Commands of the file are run. benches/peers.toml in the working folder is taken by default
+    /// if it is the one of this version.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Options of every benchmark

@@ -41,13 +41,19 @@ pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Image to write: .exr (all channels), .png, .jpg or .webp; of frames in real time also .apng, .mp4, .webm or .gif; may be repeated
+    /// Image to write: .exr (all channels), .png, .jpg, .webp; of frames also .apng, .mp4, .webm,
+    /// .gif
+    ///
+    /// Animations are of frames in real time. The option may be repeated, for several files of one
+    /// render.
     #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Write the image so far on Ctrl-C, too (the exit code is still 130)
     #[arg(long, hide_short_help = true)]
     pub keep_partial: bool,
-    /// Also write a depth image of one ray per pixel: .png (near is white, far and background black) or .exr (depth.Z)
+    /// Also write a depth image of one ray per pixel, .png or .exr (depth.Z)
+    ///
+    /// In a .png near is white, far and background are black.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide_short_help = true)]
     pub depth_image: Option<PathBuf>,
     /// Also write the rays of the first sample to PREFIX.primary.bin and PREFIX.ao.bin
@@ -56,10 +62,20 @@ pub struct RenderArgs {
     /// Print what was skipped because the scene or the options do not need it, and what that saved
     #[arg(long, hide_short_help = true)]
     pub explain: bool,
-    /// Read settings from this file, .json or .toml, which `skylit view` or a person has written; options given here replace what it says
+    /// Print all figures of the run, in place of three lines
+    ///
+    /// They are the reasons of what the scene decided, rays per second, the seconds of each part of
+    /// the run, and of frames in real time the passes. --explain prints them, too.
+    #[arg(long, short)]
+    pub verbose: bool,
+    /// Read settings from this file, .json or .toml; options replace what it says
+    ///
+    /// `skylit view` saves such files.
     #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
-    /// Send the image to the viewer tev while it renders, at every power of two of samples; frames in real time one after another [default port: 14158]
+    /// Send the image to the viewer tev while it renders [default port: 14158]
+    ///
+    /// Stills are sent at every power of two of samples, frames in real time one after another.
     #[arg(long, value_name = "HOST[:PORT]", hide_short_help = true)]
     pub tev: Option<TevAddress>,
     /// Files of the scene
@@ -68,10 +84,12 @@ pub struct RenderArgs {
     /// How files are written
     #[command(flatten)]
     pub files: FileSettings,
-    /// Files of defaults.
-    /// With --frames and --spp: leave out frames that an earlier run has finished, by what their files say of themselves
+    /// With --frames and --spp: leave out frames that an earlier run has finished
+    ///
+    /// Frames are finished by what their files say of themselves.
     #[arg(long = "continue", hide_short_help = true)]
     pub continues: bool,
+    /// Files of defaults.
     #[command(flatten)]
     pub config: ConfigArgs,
     /// What is rendered, and how
@@ -86,6 +104,11 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
+    /// Returns true if all figures are printed for people.
+    pub fn prints_all(&self) -> bool {
+        self.verbose || self.explain
+    }
+
     /// Returns true if an .exr is written.
     pub fn writes_exr(&self) -> bool {
         self.output.iter().any(|p| ImageFormat::from_path(p).is_ok_and(|f| f == ImageFormat::Exr))

@@ -109,7 +109,11 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         records.len(),
         args.settings.integrator().name(),
     ))?;
-    choices.iter().try_for_each(|choice| console.line(choice))?;
+    if args.prints_all() {
+        choices.iter().try_for_each(|choice| console.line(choice))?;
+    } else if !choices.is_empty() {
+        console.line(&choices.join("; "))?;
+    }
 
     let record = serde_json::json!({
         "stills": records,
@@ -172,10 +176,9 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     let mut report = still.report;
     report.setup.warnings.extend(viewer.warning);
     report.seconds.finish(write_start.elapsed().as_secs_f64(), start.elapsed().as_secs_f64());
-    for line in report.lines(&names(args), args.explain) {
-        console.line(&line)?;
-    }
-    if report.setup.wants_depth_image && args.depth_image.is_none() {
+    let lines = if args.prints_all() { report.lines(&names(args), args.explain) } else { report.summary(&names(args)) };
+    lines.iter().try_for_each(|line| console.line(line))?;
+    if args.prints_all() && report.setup.wants_depth_image && args.depth_image.is_none() {
         console.line("the scene requests a depth image: add --depth-image FILE")?;
     }
 
@@ -238,9 +241,8 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         console.warning(warning);
     }
     report.seconds.finish(write_seconds, start.elapsed().as_secs_f64());
-    for line in report.lines(&names(args), args.explain) {
-        console.line(&line)?;
-    }
+    let lines = if args.prints_all() { report.lines(&names(args), args.explain) } else { report.summary(&names(args)) };
+    lines.iter().try_for_each(|line| console.line(line))?;
 
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(files::lossy(&args.output));

@@ -25,7 +25,10 @@ settings! {
         ao_falloff: Option<f64>, option(value_name = "C", value_parser = parse_falloff, allow_hyphen_values = true), applies(AO);
         /// Normal of the hemisphere that AO samples [default: geometric]
         ao_normal: Option<Hemisphere>, option(value_enum), applies(AO), research;
-        /// Occlusion rays per camera ray: a power of two up to 16 [default: 2 from 64 samples per pixel on, else and with --resumable 1]
+        /// Occlusion rays per camera ray: a power of two up to 16 [default: 2 from 64 samples on,
+        /// else 1]
+        ///
+        /// With --resumable the default is 1.
         ///
         /// So many samples of a pixel share a camera ray and the surface point that it meets. Fewer camera rays take less time; edges need them.
         ao_rays: Option<u32>, option(value_name = "N", value_parser = parse_rays), applies(AppliesTo::stills_of(Capability::AmbientOcclusion));

@@ -101,11 +101,13 @@ settings! {
     /// Paths.
     "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
     pub struct PathSettings {
-        /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the
-        /// scene's, or no limit]
+        /// Maximum path length, in bounces [default: the scene's, or no limit]
+        ///
+        /// 0 is emitted light alone, 1 adds direct light.
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
-        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene,
-        /// 2 leaves indirect light alone [default: 0]
+        /// Leave out paths of fewer bounces [default: 0]
+        ///
+        /// 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone.
         min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
         /// Bounces before Russian roulette may end a path [default: 5]
         rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;

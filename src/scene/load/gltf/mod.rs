@@ -346,7 +346,7 @@ mod tests {
 
     #[test]
     fn the_page_of_formats_lists_what_is_used() {
-        let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/formats.md")).unwrap();
+        let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/reference/formats.md")).unwrap();
         let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` | used |"));
         let listed: Vec<&str> = rows.map(|(name, _)| name).collect();
         let known: Vec<&str> = KNOWN.iter().map(|(name, _)| *name).collect();
