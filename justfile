@@ -36,10 +36,6 @@ book:
 reference:
     cargo run --locked -- man docs/reference/commands --format markdown
 
-# pages of what was measured, from saved records
-results *ARGS:
-    python3 scripts/results.py {{ ARGS }}
-
 # a kit for a machine with a GPU
 gpu:
     ./scripts/gpu.sh

@@ -1,5 +1,5 @@
 //! What keeping up with a changing scene costs on the host: `cargo bench --bench dynamic`. Throughput is triangles or instances a second.
-//! docs/dynamic-scenes.md has the table and what follows from it.
+//! docs/design/bvh.md has the table and what follows from it.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

@@ -45,7 +45,8 @@ make_packages() {
   install -D -m 644 "$out/assets/completions/_skylit" "$root/share/zsh/site-functions/_skylit"
   install -D -m 644 "$out/assets/completions/skylit.fish" "$root/share/fish/vendor_completions.d/skylit.fish"
   install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE-APACHE LICENSE-MIT "$root/share/doc/skylit"
-  install -m 644 docs/*.md "$root/share/doc/skylit/docs"
+  (cd docs && find . -name '*.md' -o -path './images/*' -o -path './results/gpu/*') \
+    | while read -r file; do install -D -m 644 "docs/$file" "$root/share/doc/skylit/docs/$file"; done
   # the same bytes for the same files
   tar -C "$out" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$(git log -1 --format=%ct 2> /dev/null || date +%s)" -cf - "$name" | gzip -9n > "$out/$name.tar.gz"
   rm -rf "$root"

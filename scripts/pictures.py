@@ -31,10 +31,6 @@ LINE = 4
 # width, height and rows of sRGB bytes
 Image = tuple[int, int, list[bytes]]
 
-# the stairs of the README
-VIEW = ["--size", "360x270", "--eye=-2.2,2.4,6", "--target=-0.3,0.8,0", "--fov-y", "36"]
-# the difference at which the README's third picture has its full colour
-FULL = 0.25
 # AO radii and falloffs of the guide's page about the radius, columns and rows
 RADII = ["1%", "3%", "10%", "30%", "inf"]
 FALLOFFS = ["1", "1.15", "1.5"]
@@ -255,7 +251,7 @@ def cut(image: Image, x: int, y: int, width: int, height: int) -> Image:
     return width, height, [row[3 * x : 3 * (x + width)] for row in image[2][y : y + height]]
 
 
-def difference(a: Image, b: Image, full_at: float = FULL) -> Image:
+def difference(a: Image, b: Image, full_at: float) -> Image:
     """Linear values of two grey images: orange where the first is darker, blue where it is brighter, with full colour at a difference."""
     table = [linear(i) for i in range(256)]
     rows = []
@@ -276,14 +272,6 @@ def sheet(images: list[list[Image]]) -> Image:
 
 
 # ---- README ----
-
-
-def stairs(studio: Studio) -> None:
-    """One view as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are."""
-    a = studio.render("builtin:stairs", *VIEW, "--preset", "balanced")
-    b = studio.render("builtin:stairs", *VIEW, "--integrator", "ao-sky", "--spp", "256")
-    for name, image in (("ao.png", a), ("path.png", b), ("difference.png", difference(a, b))):
-        studio.save(name, image)
 
 
 def readme(studio: Studio) -> None:
@@ -410,7 +398,7 @@ def ao_vs_path(studio: Studio) -> None:
 
 def baking(studio: Studio) -> None:
     """A model with its baked occlusion texture, and the ambient occlusion that is traced."""
-    view = ["--size", "316x300", *VIEW[2:]]
+    view = ["--size", "316x300", "--eye=-2.2,2.4,6", "--target=-0.3,0.8,0", "--fov-y", "36"]
     images = []
     for size in ("64", "512"):
         model, image, picture = studio.path(".glb"), studio.path(".exr"), studio.path(".png")
@@ -622,7 +610,6 @@ def gallery_bench(studio: Studio) -> None:
 
 
 PICTURES: dict[str, Callable[[Studio], None]] = {
-    "ao": stairs,
     "readme": readme,
     "viewer-at-work": viewer_at_work,
     "radius": radii,

@@ -4,12 +4,12 @@
 #
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
-# --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
+# --full, before a release: every scene of the reference renderer (docs/design/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
 # the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one), lints of the library alone and of the program without benchmarks and viewer.
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths, of frames or of the renderer takes the tracer that its name picks, unless it compares them. Both do
 # without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays (a hundredth on the floor driver, as other large sets of rays there a tenth), degenerate scenes a quarter and brute force a third of that, and frames at rest are followed in one of four scenes. The floor driver leaves
 # out tests of code that knows no driver: scenes that change (tests/tracer), images that stop and go on (tests/ao), how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
-# program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/ci.md) are rendered on both drivers.
+# program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/guide/ci.md) are rendered on both drivers.
 #
 # Tests run a process each, but for those of tracers, stills and paths, and all on the floor driver: they run as threads of a process for each subject, so that they
 # share a device and its pipelines. On a CPU driver compiling pipelines is most of what they cost. Those processes run side by side, one more than there are

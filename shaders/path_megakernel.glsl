@@ -2,7 +2,7 @@
 // (path_camera, path_bounce, path_shadow) hands it on in memory: there a store is made lane by lane.
 //
 // The lanes of a subgroup go on in step: each traces a ray, shades what it hits, and traces a ray to a light. A lane whose path has ended takes the next one of its
-// subgroup, so that all have work. Rays are traced without a hierarchy (trace/few.glsl): in one, those of a subgroup would wait for the slowest of them (docs/traversal.md).
+// subgroup, so that all have work. Rays are traced without a hierarchy (trace/few.glsl): in one, those of a subgroup would wait for the slowest of them (docs/design/tracers.md).
 //
 // A path makes the rays of the wavefront with the same numbers, and adds what they bring in the same order: images are the same to the bit.
 #define KEEPS_CORNERS

@@ -148,7 +148,7 @@ fn gpu_frames_are_antialiased() {
                     .sum();
                 (error / (96.0 * 54.0)).sqrt()
             });
-            // measured at 320x180: 0.64 and 0.81 (docs/realtime.md)
+            // measured at 320x180: 0.64 and 0.81 (docs/design/real-time.md)
             assert!(
                 on < 0.9 * off && on == default,
                 "{kind}, {timeline}: RMSE {off} without, {on} with, {default} by default"

@@ -2,7 +2,7 @@
 //
 //   g++ -O3 -march=native -std=c++17 embree.cpp -o embree -lembree3 -lpthread
 //
-// One command a line on stdin, one JSON object a line on stdout; docs/benchmarks.md has the protocol and the files' layout.
+// One command a line on stdin, one JSON object a line on stdout; docs/reference/benchmarks.md has the protocol and the files' layout.
 // Kernels: one ray or packets of 16, in a scene as Embree makes it by default or with RTC_SCENE_FLAG_ROBUST.
 #include <embree3/rtcore.h>
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Mitsuba 3's path tracer as a peer of `skylit bench path`. docs/benchmarks.md has the protocol.
+"""Mitsuba 3's path tracer as a peer of `skylit bench path`. docs/reference/benchmarks.md has the protocol.
 
     pip install mitsuba==3.9.1 numpy      # and LLVM's shared library: DRJIT_LIBLLVM_PATH names it where it is not found
 

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 MODELS = {".gltf", ".glb", ".obj"}
-# Exit codes of a program that says what is wrong (docs/robustness.md); 70 is a bug, and so is an end by a signal.
+# Exit codes of a program that says what is wrong (docs/reference/exit-codes.md); 70 is a bug, and so is an end by a signal.
 REFUSALS = {2: "device", 3: "refused", 5: "out of memory", 64: "usage"}
 
 

@@ -1,4 +1,4 @@
-"""glTF's materials as Mitsuba BSDFs, written from docs/materials.md: not from the shaders that they judge.
+"""glTF's materials as Mitsuba BSDFs, written from docs/reference/materials.md: not from the shaders that they judge.
 
 Directions are in world space up to `Local`, which has the surface's frame: z is the shading normal on the side from which it is seen. `o` points
 to the viewer, `i` to the light. Values hold the cosine, as Mitsuba wants them."""

@@ -7,7 +7,7 @@
     venv/bin/python scripts/mitsuba/render.py glass cornell    # these
 
 The variant llvm_ad_rgb needs LLVM's shared library (Debian: libllvm15). Images come as blocks of samples with seeds of their own; the variance is
-that of the blocks' means. docs/mitsuba.md says what is compared, and how."""
+that of the blocks' means. docs/design/mitsuba.md says what is compared, and how."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def light_spec(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def facing(position: Any, direction: Any, half: Any) -> Any:
-    """The transform of a unit square or disk at a position, which faces a direction, its first axis horizontal; docs/path.md."""
+    """The transform of a unit square or disk at a position, which faces a direction, its first axis horizontal; docs/design/paths.md."""
     front = gltf.unit(np.array(direction, float))
     u = np.cross([0, 1, 0], front)
     u = gltf.unit(u) if np.linalg.norm(u) > 1e-6 else np.array([1.0, 0, 0])
@@ -338,7 +338,7 @@ class Builder:
 
 
 def finer(texels: np.ndarray) -> np.ndarray:
-    """The environment of docs/path.md at `FINER` times the size, as Mitsuba places texels: bilinear between middles of texels, -z in the middle,
+    """The environment of docs/design/paths.md at `FINER` times the size, as Mitsuba places texels: bilinear between middles of texels, -z in the middle,
     to rows from pole to pole and columns that begin at -z."""
     h, w, _ = texels.shape
     rows, columns = h * FINER + 1, w * FINER

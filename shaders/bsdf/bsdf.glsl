@@ -10,7 +10,7 @@
 //
 // Directions are unit vectors in the frame of the shading normal, z on the side from which the surface is seen: wo.z > 0. The integrator knows
 // no more than this: a model is a file in this folder that defines these functions with its name before them, and a line in src/interface/features.rs (`BsdfModels`), of
-// which the functions above are made. docs/materials.md has the formulas.
+// which the functions above are made. docs/reference/materials.md has the formulas.
 #ifndef BSDF_BSDF
 #define BSDF_BSDF
 #include "common/warp.glsl"

@@ -10,7 +10,7 @@ void conductor_setup(inout Bsdf b, inout MaterialPoint point) {
     b.k = SHADING_OF(m).k;
     b.facets = Microfacets(vec2(roughness * roughness), true);
     if (!HAS_COMPENSATION || is_smooth(b.facets)) return;
-    // gives back what microfacets of one bounce lose (docs/materials.md, Energy)
+    // gives back what microfacets of one bounce lose (docs/reference/materials.md, Energy)
     float e = beckmann_albedo(point.cos_o, roughness);
     b.tint *= 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
 }

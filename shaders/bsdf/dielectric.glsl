@@ -11,7 +11,7 @@ void dielectric_setup(inout Bsdf b, inout MaterialPoint point) {
     b.eta = point.front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
     b.facets = Microfacets(vec2(roughness * roughness), false);
     if (!HAS_COMPENSATION || is_smooth(b.facets)) return;
-    // gives back what microfacets of one bounce lose (docs/materials.md, Energy)
+    // gives back what microfacets of one bounce lose (docs/reference/materials.md, Energy)
     DielectricAlbedo a = dielectric_albedo(dielectric_layer(m, point.front), point.cos_o, roughness, ggx_albedo(point.cos_o, roughness), 1.0);
     float gain = 1.0 / (a.reflected + a.transmitted);
     b.tint *= gain;

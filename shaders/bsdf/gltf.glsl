@@ -1,5 +1,5 @@
 // glTF 2.0's material (appendix B) with its extensions: a clearcoat over fibres over an interface, which reflects and lets light through to what
-// scatters below it, or to the other side. docs/materials.md has the formulas. Part of bsdf/bsdf.glsl.
+// scatters below it, or to the other side. docs/reference/materials.md has the formulas. Part of bsdf/bsdf.glsl.
 #ifndef BSDF_GLTF_
 #define BSDF_GLTF_
 #include "bsdf/clearcoat.glsl"

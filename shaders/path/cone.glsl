@@ -1,6 +1,6 @@
 // Ray cones: how wide a path's footprint is, for the level of textures to read (Akenine-Moller et al., "Texture Level of Detail Strategies for
 // Real-Time Ray Tracing", 2019, and "Improved Shader and Texture Level of Detail Using Ray Cones", 2021). A cone starts as a pixel and has no
-// direction across: footprints are squares. docs/path.md says what else is left out.
+// direction across: footprints are squares. docs/design/paths.md says what else is left out.
 #ifndef PATH_CONE
 #define PATH_CONE
 #include "scene/surface.glsl"

@@ -1,7 +1,7 @@
 // The compute tracer's simple kernel: a two-level binary BVH, one ray per lane. It supplies main() around the
 // stream's ray(), closest() or any(). The fast kernel is wide.glsl.
 //
-// Two orders of the children, after Coello's study (2024; docs/traversal.md): first the one whose box the ray enters first, or first the one
+// Two orders of the children, after Coello's study (2024; docs/design/tracers.md): first the one whose box the ray enters first, or first the one
 // that comes first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE

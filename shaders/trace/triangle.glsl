@@ -2,7 +2,7 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
-// Without WATERTIGHT it is the test of Möller and Trumbore, for benchmarks of the cost of watertightness (docs/traversal.md).
+// Without WATERTIGHT it is the test of Möller and Trumbore, for benchmarks of the cost of watertightness (docs/design/tracers.md).
 
 // The ray's frame: z is the axis of the largest direction component, and the shear aligns the ray with z.
 struct Shear {

@@ -27,7 +27,7 @@ layout(local_size_x = LANES) in;
 // lane fetches at least one; what is not done when the loop is about to end is suspended (suspend.glsl).
 
 // Storing a hit and taking the next ray cost a vector of lanes the same whether one lane does it or all. So a lane whose ray is done waits until the number of
-// iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/traversal.md).
+// iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/design/tracers.md).
 const uint REFILL_INTERVAL = 4u;
 
 // On CPUs, where a lane has many rays (lane_budget in src/tracer/lane_budget.rs), the first subgroup of a work-group traces all of its rays, and counts them in a register. A counter

@@ -2,7 +2,7 @@
 //! matters most; by obvhs's clustering and reinsertion (Meister and Bittner, "Parallel
 //! Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018) by default;
 //! with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where build time does not
-//! matter. docs/traversal.md has the measurements behind the choice.
+//! matter. docs/design/bvh.md links the measurements behind the choice.
 //!
 //! The depth of what comes out is bounded, whatever the input: the builders halve where they would
 //! go deeper, and a subtree that reinsertion made too deep is replaced by a balanced one over the
@@ -38,7 +38,7 @@ pub enum BuildPreset {
 impl BuildPreset {
     /// Chooses a preset for a number of primitives and an expected number of rays. On Sponza
     /// `Default` traces faster than `Fast` for little more building, on the dragon hardly
-    /// (docs/traversal.md has the table): with fewer rays than primitives that does not pay back,
+    /// (docs/design/bvh.md): with fewer rays than primitives that does not pay back,
     /// and above ten million primitives the fastest build is used.
     ///
     /// Never `Best`: three times the build time for hardly anything on the dragon, and on Sponza

@@ -15,8 +15,8 @@ pub fn title(record: &Record) -> String {
     let settings = record.settings.iter().map(|(name, value)| format!(", {name} {value}")).collect::<String>();
     let peers = record.peers.iter().map(|p| format!("; beside {p}")).collect::<String>();
     let name = match record.benchmark {
-        BenchKind::Builders => "docs/bvh.md".to_owned(),
-        other => format!("docs/bench-{}.md", other.name()),
+        BenchKind::Builders => "docs/reference/bvh.md",
+        _ => "docs/reference/benchmarks.md",
     };
     format!("{}{settings}{peers}; {name} explains the columns", record.host.line())
 }

@@ -1,5 +1,5 @@
 //! Defaults of settings from files called `skylit.toml`: one in the user's configuration folder,
-//! one beside the scene. docs/settings.md describes them.
+//! one beside the scene. docs/reference/settings.md describes them.
 //!
 //! A default is not a choice: one without effect is left out, where the same setting on the command
 //! line would be an error, and none turns a still into frames in real time.

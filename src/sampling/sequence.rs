@@ -13,7 +13,7 @@ const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
 impl Sequence {
     /// Convergence exponent e beyond that of random sampling: the variance of the mean of n samples
-    /// of a smooth function falls as n^-(1 + e). Measured (docs/realtime.md).
+    /// of a smooth function falls as n^-(1 + e). Measured (docs/design/real-time.md).
     pub fn evenness(self) -> f32 {
         match self {
             Sequence::Sobol => 0.375,

@@ -27,7 +27,7 @@ use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleL
 use crate::scene::Geometry;
 
 /// Maximum number of TLAS instances for which the top level is always rebuilt:
-/// docs/dynamic-scenes.md has the measurement.
+/// docs/design/bvh.md has the measurement.
 const MAX_TOP_REBUILD: usize = 256;
 /// Number of levels by which a rebuilt tree may be deeper than the first one.
 const SPARE_LEVELS: u32 = 4;

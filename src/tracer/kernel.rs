@@ -9,7 +9,7 @@ use crate::settings::choices;
 use crate::shaders::StreamShaders;
 
 choices! {
-    /// Traversal kernel of the compute tracer. All give the same hits; docs/traversal.md compares their speed.
+    /// Traversal kernel of the compute tracer. All give the same hits; docs/design/tracers.md compares their speed.
     pub enum Kernel {
         /// seven-wide nodes; packets for coherent rays, else each ray by itself
         Auto = "auto",

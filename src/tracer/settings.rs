@@ -66,7 +66,7 @@ impl BuildChoice {
 }
 
 choices! {
-    /// How a BVH is built: a quality, or rules of the laboratory (docs/bvh.md), of which those of
+    /// How a BVH is built: a quality, or rules of the laboratory (docs/reference/bvh.md), of which those of
     /// projected areas and facing planes are for rays of one direction or point.
     pub enum BuildMethod {
         /// Chosen by the number of primitives and rays

@@ -217,7 +217,7 @@ impl Manifest {
         }
         let text = crate::files::read_regular_text(&path).map_err(|e| match e.kind() {
             ErrorKind::NotFound => {
-                Error::input(&path, format!("no such file: it lists the frames, such as {EXAMPLE} (docs/ci.md)"))
+                Error::input(&path, format!("no such file: it lists the frames, such as {EXAMPLE} (docs/guide/ci.md)"))
             }
             _ => Error::read(&path, &e),
         })?;

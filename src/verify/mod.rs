@@ -2,7 +2,7 @@
 //!
 //! [`manifest`] reads `frames.toml`, [`selection`] chooses frames, [`session`] renders them,
 //! [`judge`] compares by a [`tolerance`], [`bless`] makes [`golden`] images; [`junit`] writes
-//! results for CI servers, [`html`] for people. docs/ci.md is for users.
+//! results for CI servers, [`html`] for people. docs/guide/ci.md is for users.
 
 pub mod bless;
 pub mod golden;

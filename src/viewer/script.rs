@@ -21,7 +21,7 @@ const OPENING: Duration = Duration::from_secs(2);
 /// Time in which a control comes into view that a list or the panel has scrolled away.
 const SCROLLING: Duration = Duration::from_millis(200);
 
-/// The commands, for help and docs/viewer.md.
+/// The commands, for help and docs/guide/viewer.md.
 pub const COMMANDS: &[(&str, &str)] = &[
     ("wait SECONDS", "let time pass"),
     (

@@ -1,5 +1,5 @@
 //! A machine that does not do as it should: files that cannot be named in Unicode, disks that are full or read-only, memory that runs out, devices that are lost, signals, other
-//! processes, clocks. Each ends with one line and its exit code, with nothing half-written and no temporary file left (docs/robustness.md).
+//! processes, clocks. Each ends with one line and its exit code, with nothing half-written and no temporary file left (docs/reference/exit-codes.md).
 
 use std::ffi::OsString;
 use std::io::Read;

@@ -1,6 +1,6 @@
 //! Path-traced images by every tracer against Mitsuba 3's of the same scenes: an implementation of others as the reference.
 //!
-//! `scripts/mitsuba` writes scenes and the reference images (`tests/mitsuba`); docs/mitsuba.md says what they cover, where conventions differ, and what
+//! `scripts/mitsuba` writes scenes and the reference images (`tests/mitsuba`); docs/design/mitsuba.md says what they cover, where conventions differ, and what
 //! this test can see. Images are noisy on both sides, so the test is whether they differ by more than noise explains:
 //!
 //! - **pixels**: a Z-test of every pixel and channel, Sidak-corrected to a level of 1 % for the whole image (Subr, Arvo 2007; Rousselle, Jarosz,

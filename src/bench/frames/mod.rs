@@ -1,6 +1,6 @@
 //! `skylit bench frames`: cost and error of frames in real time, preset by preset, beside plain
 //! accumulation in the same time: standing still, moving, after changes, and along series.
-//! docs/bench-frames.md and docs/bench-ao.md say what is measured and how.
+//! docs/reference/benchmarks.md says what is measured and how.
 
 mod args;
 mod bounces;

@@ -1,5 +1,5 @@
 //! `skylit bench path`: error of path-traced images over time, by sampling strategy and beside
-//! peers. docs/bench-path.md says what is measured and how.
+//! peers. docs/reference/benchmarks.md says what is measured and how.
 
 mod args;
 mod contestant;

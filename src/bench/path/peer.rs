@@ -1,4 +1,4 @@
-//! Messages to a peer that renders paths: a scene in files, images back (docs/benchmarks.md).
+//! Messages to a peer that renders paths: a scene in files, images back (docs/reference/benchmarks.md).
 
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::Error;

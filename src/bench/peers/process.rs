@@ -1,4 +1,4 @@
-//! A peer's process: lines on its stdin, answers in JSON lines (docs/benchmarks.md).
+//! A peer's process: lines on its stdin, answers in JSON lines (docs/reference/benchmarks.md).
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;

@@ -154,7 +154,7 @@ impl RaySession<'_> {
             scenes::load(source, self.args.alpha, self.args.ao_radius, f64::from(size[0]) / f64::from(size[1]))?;
         self.note_warnings(source, &loaded.scene);
         if let Some(known) = loaded.well_known {
-            self.note(format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));
+            self.note(format!("{source}: seen and lit as {known} is (docs/reference/benchmarks.md)"));
         }
         interrupt::check()?;
 

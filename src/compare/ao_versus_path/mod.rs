@@ -67,7 +67,7 @@ impl Default for AoVersusPathSettings {
     fn default() -> Self {
         Self {
             size: [640, 360],
-            // as good a radius as twice as many samples give (docs/ao-versus-path.md)
+            // as good a radius as twice as many samples give (docs/results/ao-versus-path.md)
             spp: 16,
             ao_samples: 32,
             seed: 0,

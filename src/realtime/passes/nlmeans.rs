@@ -12,7 +12,7 @@ use crate::shaders::{self, ComputeShader};
 use crate::tracer::Tracer;
 
 /// Assumed convergence of samplers: the variance of n samples falls as `n^-(1 + EVENNESS)`. It is
-/// within half of that for 64 samples of ambient occlusion in six scenes (docs/denoising.md).
+/// within half of that for 64 samples of ambient occlusion in six scenes (docs/guide/denoising.md).
 pub const EVENNESS: f32 = 0.33;
 
 /// The shader for images of so many channels, 1 or 3.

@@ -27,7 +27,7 @@ impl Files<'_> {
 }
 
 /// Writes a scene for programs that benchmarks run beside ours: `scene.json` in a folder, and a
-/// file for each of its arrays. docs/benchmarks.md has the format.
+/// file for each of its arrays. docs/reference/benchmarks.md has the format.
 ///
 /// # Errors
 /// [`Error::Output`]; [`Error::Scene`] for a light that the format does not have.

@@ -13,7 +13,7 @@ use crate::viewer::browse::Browsing;
 use crate::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
 use crate::viewer::request::Task;
 
-/// Keys and mouse, for the help window and docs/viewer.md.
+/// Keys and mouse, for the help window and docs/guide/viewer.md.
 pub const CONTROLS: &[(&str, &str)] = &[
     ("Drag", "orbit around the pivot"),
     ("Shift + drag, middle drag", "move sideways and up"),

@@ -1,6 +1,6 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Read by a parser of our own, because no crate is fit for what users have; docs/formats.md has
+//! Read by a parser of our own, because no crate is fit for what users have; docs/reference/formats.md has
 //! what tobj, the one that is kept best, reads of it. obj-rs names no line of an error,
 //! wavefront_obj refuses vertex colours and relative indices, and nobject-rs and wavefront take
 //! broken numbers without a word.
