@@ -13,9 +13,13 @@ use super::args::LoadArgs;
 use super::rays::read_rays;
 use crate::accel::flatten::FlatScene;
 use crate::accel::lab::analysis::{TreeAnalysis, TreeCost, analyse};
-use crate::accel::lab::influence::{InfluenceArea, Placement, areas_of_rays, areas_of_scene};
+use crate::accel::lab::budget::{IMAGE_RAYS, LightBudget, Whole, light_budget};
+use crate::accel::lab::builder::MAX_LEAF;
+use crate::accel::lab::influence::{InfluenceArea, Placement, areas_of_rays, areas_of_scene, light_name};
 use crate::accel::lab::local::{FallbackStart, LocalTrees, TopLevelKind};
-use crate::accel::lab::streams::{RayStream, corners, image_streams, parallel_rays, point_rays};
+use crate::accel::lab::streams::{
+    RayStream, camera_rays, corners, image_streams, parallel_rays, point_rays, surfaces, usual_lights,
+};
 use crate::accel::lab::{Body, Builder, Heuristic, HeuristicChoice, Hierarchy, LabRay, Query, RayDistribution};
 use crate::error::{Error, Result};
 use crate::files;
@@ -23,7 +27,7 @@ use crate::files::plan::FilePlan;
 use crate::film::camera::{self, Choice};
 use crate::integrators::rays;
 use crate::ray::translate;
-use crate::scene::{Scene, SceneSettings};
+use crate::scene::{Camera, Light, Scene, SceneSettings};
 use crate::settings::parse::parse_vector;
 use crate::terminal::console::{Failure, Verbosity};
 use crate::terminal::interrupt;
@@ -46,6 +50,11 @@ const AO_RADIUS: f64 = 0.1;
 const RAYS: usize = 10_000;
 /// Recorded rays that are counted at most: evenly spaced ones of a larger set.
 const MAX_RAYS: usize = 100_000;
+/// Lights whose budgets are counted.
+const MAX_LIGHTS: usize = 16;
+/// Primitives, over all instances, up to which budgets of lights are counted: each light's trees
+/// are built over all of them.
+const MAX_BUDGET_PRIMITIVES: u64 = 2_000_000;
 /// Trees of groups that text and pages show; JSON has all.
 const SHOWN_TREES: usize = 5;
 
@@ -157,6 +166,8 @@ pub struct BvhReport {
     pub predicted: TreeCost,
     /// Counts of rays.
     pub streams: Vec<StreamCounts>,
+    /// Whether a local tree would pay, light by light.
+    pub lights: Vec<LightBudget>,
     /// Names of influence areas, and the primitives in their trees.
     pub areas: Vec<(String, u64)>,
     /// Names of meshes and their materials, by the index of the mesh.
@@ -207,21 +218,7 @@ pub fn run(args: &BvhArgs) -> Result<(), Failure> {
     let predicted = predicted(&flat, &hierarchy, &trees);
 
     // rays
-    let streams = match (recorded.clone(), args.direction, args.eye) {
-        (Some(rays), ..) => vec![RayStream { name: "recorded".into(), query: Query::Closest, rays }],
-        (_, Some(d), _) => {
-            vec![RayStream { name: "parallel".into(), query: Query::Closest, rays: parallel_rays(d, &bounds, RAYS) }]
-        }
-        (.., Some(eye)) => {
-            let rays = point_rays(eye - flat.origin, &bounds, RAYS);
-            vec![RayStream { name: "from the eye".into(), query: Query::Closest, rays }]
-        }
-        _ => {
-            let camera = camera::choose(&scene, &Choice::Auto, f64::from(IMAGE[0]) / f64::from(IMAGE[1]))?;
-            let radius = AO_RADIUS * bounds[0].distance(bounds[7]);
-            image_streams(&hierarchy, &scene, &camera, flat.origin, IMAGE, radius)
-        }
-    };
+    let streams = args.streams(&flat, &hierarchy, recorded.clone(), &bounds)?;
     let mut counts: Vec<StreamCounts> = streams.iter().flat_map(|s| count(&hierarchy, s)).collect();
     if args.wide {
         match VisitCounter::new(&flat) {
@@ -230,16 +227,27 @@ pub fn run(args: &BvhArgs) -> Result<(), Failure> {
         }
     }
 
+    // whether local trees would pay: for the lights of an image
+    let is_of_image = recorded.is_none() && args.direction.is_none() && args.eye.is_none();
+    let lights = if is_of_image {
+        budgets(args, &flat, &hierarchy, &builder, &bounds).unwrap_or_else(|e| {
+            warnings.add(&format!("no light is asked whether a local tree would pay: {e}"));
+            Vec::new()
+        })
+    } else {
+        Vec::new()
+    };
+    if is_of_image && scene.lights.len() > MAX_LIGHTS {
+        warnings.add(&format!("of {} lights the first {MAX_LIGHTS} are asked whether a tree pays", scene.lights.len()));
+    }
+
     // local trees
     let mut areas = Vec::new();
     if let Some(chosen) = &args.areas {
         let found = match (placements, recorded.as_deref()) {
             (Some(list), _) => list.iter().map(|p| p.area(flat.origin)).collect(),
             (None, Some(rays)) if chosen == "rays" => areas_of_rays("recorded rays", rays, &bounds),
-            _ => {
-                let camera = camera::choose(&scene, &Choice::Auto, f64::from(IMAGE[0]) / f64::from(IMAGE[1]))?;
-                areas_of_scene(&scene, &[camera], flat.origin)
-            }
+            _ => areas_of_scene(&scene, &[image_camera(&scene)?], flat.origin),
         };
         if found.is_empty() {
             warnings.add("--areas: the rays have neither a direction nor a point in common, so there is no area");
@@ -255,6 +263,7 @@ pub fn run(args: &BvhArgs) -> Result<(), Failure> {
         trees,
         predicted,
         streams: counts,
+        lights,
         areas,
         meshes: mesh_names(&scene),
         warnings: Vec::new(),
@@ -337,6 +346,27 @@ impl BvhArgs {
             return Err(Error::input(path, why));
         }
         Ok(found)
+    }
+
+    /// The rays that are counted: those that are given, or those of an image.
+    fn streams(
+        &self,
+        flat: &FlatScene,
+        hierarchy: &Hierarchy,
+        recorded: Option<Vec<LabRay>>,
+        bounds: &[DVec3; 8],
+    ) -> Result<Vec<RayStream>> {
+        let given = match (recorded, self.direction, self.eye) {
+            (Some(rays), ..) => ("recorded", rays),
+            (_, Some(direction), _) => ("parallel", parallel_rays(direction, bounds, RAYS)),
+            (.., Some(eye)) => ("from the eye", point_rays(eye - flat.origin, bounds, RAYS)),
+            _ => {
+                let radius = AO_RADIUS * bounds[0].distance(bounds[7]);
+                let camera = image_camera(flat.scene)?;
+                return Ok(image_streams(hierarchy, flat.scene, &camera, flat.origin, IMAGE, radius));
+            }
+        };
+        Ok(vec![RayStream { name: given.0.into(), query: Query::Closest, rays: given.1 }])
     }
 
     fn builder(&self, rays: RayDistribution) -> Builder {
@@ -489,6 +519,49 @@ fn count_local(
     Ok(trees.locals().iter().map(|l| (l.area.name.clone(), l.tree.primitive_indices.len() as u64)).collect())
 }
 
+/// The camera of the image whose rays are counted.
+fn image_camera(scene: &Scene) -> Result<Camera> {
+    camera::choose(scene, &Choice::Auto, f64::from(IMAGE[0]) / f64::from(IMAGE[1]))
+}
+
+/// Whether a local tree would pay for the shadow rays of each light of an image.
+fn budgets(
+    args: &BvhArgs,
+    flat: &FlatScene,
+    hierarchy: &Hierarchy,
+    builder: &Builder,
+    bounds: &[DVec3; 8],
+) -> Result<Vec<LightBudget>> {
+    if flat.scene.triangle_count() + flat.scene.sphere_count() > MAX_BUDGET_PRIMITIVES {
+        let why = format!("the scene has more than {MAX_BUDGET_PRIMITIVES} primitives over all instances");
+        return Err(Error::Scene(why));
+    }
+
+    // a tree over all primitives: there is one where the scene has a single level
+    let (own_body, own_tree);
+    let whole = match (&hierarchy.top, hierarchy.groups.first()) {
+        (None, Some((tree, body))) => Whole { body, tree },
+        _ => {
+            own_body = Body::from_scene(flat)?;
+            own_tree = builder.tree(&own_body.boxes(), MAX_LEAF);
+            Whole { body: &own_body, tree: &own_tree }
+        }
+    };
+
+    // lights with their names
+    let numbered = flat.scene.lights.iter().take(MAX_LIGHTS).enumerate();
+    let mut lights: Vec<(String, Light)> = numbered.map(|(k, l)| (light_name(l, k), l.clone())).collect();
+    if lights.is_empty() {
+        lights = usual_lights(flat.scene).map(|l| (format!("{} (the scene has no light)", l.name), l)).into();
+    }
+    let seen = surfaces(hierarchy, &camera_rays(&image_camera(flat.scene)?, flat.origin, IMAGE));
+    let rules = |choice: HeuristicChoice| args.with_constants(choice.heuristic(RayDistribution::Uniform));
+    let budget = |(name, light): &(String, Light)| {
+        light_budget(hierarchy, &whole, (name, light), &seen, (bounds, flat.origin), rules)
+    };
+    Ok(lights.iter().filter_map(budget).collect())
+}
+
 /// A name; the number of what has none.
 fn named(name: &str, number: usize) -> String {
     if name.is_empty() { format!("#{number}") } else { name.to_owned() }
@@ -519,6 +592,17 @@ impl BvhReport {
             format!("{mesh} ({material}, {n})")
         });
         each.collect::<Vec<_>>().join(", ")
+    }
+
+    /// How it is decided whether a local tree pays; `None` where no light was asked.
+    pub fn budget(&self) -> Option<String> {
+        let ns = self.lights.iter().map(|l| l.box_test_ns).fold(f64::INFINITY, f64::min);
+        (!self.lights.is_empty()).then(|| {
+            format!(
+                "A tree pays if it saves its build within the {:.0} million shadow rays of an image of 1280x720 with 64 samples a pixel; a box test takes {ns:.1} ns here.",
+                IMAGE_RAYS * 1e-6
+            )
+        })
     }
 
     /// The figures of the whole, name and value.
@@ -583,6 +667,10 @@ fn text(report: &BvhReport) -> Vec<String> {
     }
     lines.extend(report.areas.iter().map(|(name, n)| format!("{:<12}{name}: {n} references", "area")));
 
+    // lights
+    lines.extend(report.lights.iter().map(|l| format!("{:<12}{}", "light", l.describe())));
+    lines.extend(report.budget().map(|text| format!("{:<12}{text}", "")));
+
     // rays
     let title = format!(
         "{:<12}{:<18} {:<11} {:<11} {:>7} {:>6} {:>8} {:>8} {:>10} {:>8}",
@@ -633,6 +721,7 @@ fn record(report: &BvhReport) -> serde_json::Value {
         "trees": report.trees,
         "meshes": named,
         "streams": report.streams,
+        "lights": report.lights,
         "areas": report.areas.iter().map(|(name, n)| json!({ "name": name, "references": n })).collect::<Vec<_>>(),
         "warnings": report.warnings,
     })

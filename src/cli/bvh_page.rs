@@ -12,6 +12,7 @@ use crate::terminal::console::command_line;
 /// Writes the page into a folder, and returns its path.
 pub fn write(report: &BvhReport, dir: &Path) -> Result<PathBuf> {
     let mut sections = vec![rays(report)];
+    sections.extend(report.budget().map(|about| lights(report, about)));
     sections.extend(report.shown().iter().map(|tree| levels(report, tree)));
     let page = Page {
         title: format!("Hierarchy of {}", report.scene),
@@ -51,6 +52,28 @@ fn rays(report: &BvhReport) -> Section {
     }
     let about = "Means over rays. Exhaustive traversal visits every box that a ray meets, hit or no hit: the number that areas predict.";
     Section::new("Rays", vec![Part::Text(about.into()), Part::Table(table)])
+}
+
+/// Whether local trees would pay, light by light.
+fn lights(report: &BvhReport, about: String) -> Section {
+    let columns =
+        ["light", "rays", "boxes a ray", "with a local tree", "rules", "build, ms", "pays from, rays", "pays"];
+    let mut table = Table::new(&columns);
+    for l in &report.lights {
+        table = table.row(Row::new([
+            l.light.as_str().into(),
+            whole(l.rays as u64),
+            l.boxes.into(),
+            l.local_boxes.into(),
+            l.rules.into(),
+            l.build_ms.into(),
+            l.break_even_rays.map_or_else(|| Cell::from("-"), |rays| whole(rays as u64)),
+            if l.pays { "yes" } else { "no" }.into(),
+        ]));
+    }
+    let sentences = report.lights.iter().map(|l| Part::Text(format!("{}.", l.describe())));
+    let parts = std::iter::once(Part::Text(about)).chain(sentences).chain([Part::Table(table)]);
+    Section::new("Would local trees pay?", parts.collect())
 }
 
 /// One tree, level by level.

@@ -180,7 +180,7 @@ impl DeviceSettings {
     }
 
     /// The rays that the BVH is built for, in world space; `None` where none are given.
-    fn build_rays(&self) -> Option<RayDistribution> {
+    pub fn build_rays(&self) -> Option<RayDistribution> {
         self.build_direction.map(RayDistribution::Parallel).or(self.build_eye.map(RayDistribution::Point))
     }
 

@@ -11,6 +11,7 @@ use super::browse::Browsing;
 use super::camera::CameraControl;
 use super::dialog::{Dialog, RenderWanted, RenderedMotion};
 use super::file_kind::FileKind;
+use super::hierarchy::{FoundHierarchy, HierarchyKey, HierarchyState};
 use super::layer::Layer;
 use super::options::{CPU_FRAME_RATE, ViewOptions};
 use super::remembered::{Hint, Remembered};
@@ -31,6 +32,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
+use crate::renderer::survey::rays::camera_ray;
 use crate::scene::load::{GeometryOptions, LoadOptions};
 use crate::scene::material_edit::MaterialEdit;
 use crate::scene::settings::variant_index;
@@ -183,6 +185,8 @@ pub struct App {
     outline: Option<Arc<Outline>>,
     /// Primitive that was clicked on.
     pub pick: Option<Pick>,
+    /// Choices of what is drawn of the hierarchy, and its boxes.
+    pub hierarchy: HierarchyState,
     /// Text that says what is being loaded, and the share that is done.
     pub loading: Option<(String, Option<f32>)>,
     /// Names of the Vulkan devices, by index.
@@ -278,6 +282,7 @@ impl App {
             selected: None,
             outline: None,
             pick: None,
+            hierarchy: HierarchyState::default(),
             loading: None,
             devices: Vec::new(),
             failure: None,
@@ -589,6 +594,7 @@ impl App {
                 }
                 Event::Outline(outline) => self.outline = Some(outline),
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
+                Event::Hierarchy(found) => self.hierarchy.found = Some(*found),
                 Event::Exposure(load, stops) if load == self.loaded => self.expose(stops),
                 Event::Exposure(..) => {}
 
@@ -623,7 +629,7 @@ impl App {
         self.panes.iter_mut().for_each(|p| (p.error, p.black) = (None, None));
         if !is_same_load {
             // indices and names of what was there before
-            (self.pick, self.outline) = (None, None);
+            (self.pick, self.outline, self.hierarchy.ray) = (None, None, None);
             self.selected = self.selected.filter(|k| is_same && *k < summary.objects.len());
         }
         if !is_same && self.scene.is_some() {
@@ -737,6 +743,18 @@ impl App {
             == (self.selected, self.playback.time, self.size)
             && shown == Some(&outline.camera);
         is_shown.then_some(outline)
+    }
+
+    /// Hierarchy and influence areas of what was requested last, once the renderer has found them.
+    pub fn found_hierarchy(&self) -> Option<&FoundHierarchy> {
+        self.hierarchy.found.as_ref().filter(|found| found.key == HierarchyKey::of_request(&self.sent))
+    }
+
+    /// Notes the ray through a point of the view, from (0, 0) at the top left to (1, 1): the
+    /// hierarchy shows what it visits.
+    pub fn remember_ray(&mut self, at: [f64; 2]) {
+        let aspect = f64::from(self.size[0].max(1)) / f64::from(self.size[1].max(1));
+        self.hierarchy.ray = self.shown_camera().map(|camera| camera_ray(&camera, at, aspect));
     }
 
     /// How settings name an object: by its name, unless others have it.
@@ -981,6 +999,7 @@ impl App {
             first_camera: self.settings.camera.clone(),
             followed_camera: self.followed,
             selected: self.selected,
+            hierarchy: self.hierarchy.is_shown(),
             shown,
             panes,
             size: self.size,

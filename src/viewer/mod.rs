@@ -13,6 +13,7 @@ pub mod dialog;
 mod file_kind;
 #[cfg(feature = "probes")]
 pub mod headless;
+pub mod hierarchy;
 pub mod images;
 pub mod layer;
 mod options;
@@ -28,6 +29,7 @@ pub mod script;
 pub mod technique;
 mod theme;
 pub mod window;
+mod wireframe;
 pub mod worker;
 
 pub use file_kind::FileKind;

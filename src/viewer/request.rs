@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 
+use super::hierarchy::FoundHierarchy;
 use crate::integrators::lighting::LightingSettings;
 use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
@@ -52,6 +53,8 @@ pub struct Request {
     pub followed_camera: Option<usize>,
     /// The instance whose outline is wanted, an index.
     pub selected: Option<usize>,
+    /// Hierarchy and influence areas are wanted.
+    pub hierarchy: bool,
     /// Images to render: those on the screen, then the truth.
     pub panes: Vec<RenderSettings>,
     /// Number of images on the screen, which are rendered while something moves.
@@ -162,6 +165,8 @@ pub enum Event {
     Picked(PickPurpose, Box<Option<Pick>>),
     /// The outline of what is selected was found, seen by a camera at rest.
     Outline(Arc<Outline>),
+    /// The scene's hierarchy, if it is wanted.
+    Hierarchy(Box<FoundHierarchy>),
     /// A file was written, or an error.
     Saved(Result<PathBuf, String>),
     /// A message for the user.

@@ -61,6 +61,35 @@ fn instances_and_spheres_are_described() {
     assert!(spheres["warnings"][0].as_str().unwrap().contains("--wide is left out"), "{spheres}");
 }
 
+/// One line for each light; the verdict is that of the figures. A scene without lights is asked about those of its image, given rays about none.
+#[test]
+fn lights_are_asked_whether_a_tree_pays() {
+    let scene = "scenes/courtyard.gltf";
+    let record = json(&run(&["bvh", scene, "--json"]));
+    let lights = record["lights"].as_array().unwrap();
+    assert!(!lights.is_empty(), "{record}");
+    for l in lights {
+        let number = |key: &str| l[key].as_f64().unwrap();
+        let saved = number("boxes") - number("local_boxes");
+        assert!(number("rays") > 100.0 && number("boxes") > 1.0 && number("build_ms") > 0.0, "{l}");
+        let rays = l["break_even_rays"].as_f64();
+        assert_eq!(rays.is_some(), saved > 0.0, "{l}");
+        let expected = 1e6 * number("build_ms") / (saved * number("box_test_ns"));
+        assert!(rays.is_none_or(|n| (n / expected - 1.0).abs() < 1e-9), "{l}");
+        assert_eq!(l["pays"], rays.is_some_and(|n| n <= 1280.0 * 720.0 * 64.0), "{l}");
+    }
+    let city = String::from_utf8(run(&["bvh", "builtin:city:5000"]).stdout).unwrap();
+    assert!(city.contains("light       light `sun`: would save ") && !city.contains("sun from above"), "{city}");
+    let text = String::from_utf8(run(&["bvh", "builtin:terrain:5000"]).stdout).unwrap();
+    for expected in
+        ["sun from above (the scene has no light): would save ", "lamp in the upper part", "A tree pays if it saves"]
+    {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    let directed = json(&run(&["bvh", "builtin:city:5000", "--direction", "0,-1,0", "--json"]));
+    assert_eq!(directed["lights"], serde_json::json!([]));
+}
+
 #[test]
 fn areas_of_a_scene_and_of_a_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -85,7 +114,9 @@ fn a_page_has_levels_and_subtrees() {
     let page = place(&folder, "report");
     let record = json(&run(&["bvh", "scenes/parade.glb", "--html", &page, "--json"]));
     let text = std::fs::read_to_string(record["report"].as_str().unwrap()).unwrap();
-    for expected in ["Overlap of siblings", "Costliest subtrees", "by surface area", "skylit bvh"] {
+    for expected in
+        ["Overlap of siblings", "Costliest subtrees", "by surface area", "skylit bvh", "Would local trees pay?"]
+    {
         assert!(text.contains(expected), "{expected}");
     }
 }

@@ -18,10 +18,10 @@ use skylit::viewer::technique::Technique;
 use skylit::viewer::{FileKind, ViewOptions, panels};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
-struct Alone {
-    harness: Harness<'static, App>,
-    mailbox: Arc<Mailbox>,
-    events: EventSender,
+pub struct Alone {
+    pub harness: Harness<'static, App>,
+    pub mailbox: Arc<Mailbox>,
+    pub events: EventSender,
 }
 
 fn alone(scene: Option<&str>) -> Alone {
@@ -50,7 +50,7 @@ fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
     Alone { harness, mailbox, events: EventSender::new(sender, Arc::new(|| {})) }
 }
 
-fn loaded() -> Alone {
+pub fn loaded() -> Alone {
     loaded_with(RenderSettings::default())
 }
 
@@ -100,7 +100,7 @@ fn loaded_with(settings: RenderSettings) -> Alone {
 }
 
 impl Alone {
-    fn click(&mut self, label: &str) {
+    pub fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).click();
         self.harness.run_steps(3);
     }
@@ -110,13 +110,13 @@ impl Alone {
         self.harness.run_steps(3);
     }
 
-    fn change(&mut self, change: impl FnOnce(&mut App)) -> skylit::viewer::request::Request {
+    pub fn change(&mut self, change: impl FnOnce(&mut App)) -> skylit::viewer::request::Request {
         change(self.harness.state_mut());
         self.harness.run_steps(2);
         self.mailbox.peek()
     }
 
-    fn shows(&self, text: &str) -> bool {
+    pub fn shows(&self, text: &str) -> bool {
         self.harness.query_all_by_label_contains(text).count() > 0
     }
 }

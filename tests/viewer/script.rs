@@ -8,7 +8,7 @@ use skylit::renderer::RenderSettings;
 use skylit::tracer::DeviceSettings;
 use skylit::viewer::{ViewOptions, headless};
 
-fn options(scene: Option<&str>) -> ViewOptions {
+pub fn options(scene: Option<&str>) -> ViewOptions {
     ViewOptions {
         scene: scene.map(str::to_owned),
         gltf_scene: None,

@@ -12,7 +12,7 @@ use super::projection::{RayDistribution, View, frame};
 use super::region::Region;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::scene::{Camera, LightKind, Projection, Scene};
+use crate::scene::{Camera, Light, LightKind, Projection, Scene};
 
 /// Cosine of the angle up to which a direction agrees with that of an area (Falcone's).
 pub const AGREEMENT: f64 = 0.99;
@@ -89,18 +89,7 @@ pub fn areas_of_scene(scene: &Scene, cameras: &[Camera], origin: DVec3) -> Vec<I
     let corners: [DVec3; 8] = std::array::from_fn(|k| pick(k) - origin);
     let mut out = Vec::new();
     for (k, light) in scene.lights.iter().enumerate() {
-        let name = if light.name.is_empty() { format!("light {k}") } else { format!("light `{}`", light.name) };
-        let position = light.position - origin;
-        match light.kind {
-            LightKind::Directional { .. } => {
-                out.push(InfluenceArea::around(name, light.direction, &corners));
-            }
-            LightKind::Spot { outer_angle, .. } if f64::from(outer_angle) < WIDEST.to_radians() => {
-                let view = View::new(position, light.direction, DVec2::splat(f64::from(outer_angle).tan()));
-                out.extend(InfluenceArea::of_view(name, view, 0.0, &corners));
-            }
-            _ => out.extend(InfluenceArea::around_point(&name, position, &corners)),
-        }
+        out.extend(areas_of_light(light, &light_name(light, k), &corners, origin));
     }
     for (k, camera) in cameras.iter().enumerate() {
         let name = if camera.name.is_empty() { format!("camera {k}") } else { format!("camera `{}`", camera.name) };
@@ -119,6 +108,24 @@ pub fn areas_of_scene(scene: &Scene, cameras: &[Camera], origin: DVec3) -> Vec<I
         }
     }
     out
+}
+
+/// A light in words: its name, or its number.
+pub fn light_name(light: &Light, number: usize) -> String {
+    if light.name.is_empty() { format!("light {number}") } else { format!("light `{}`", light.name) }
+}
+
+/// Influence areas of a light in bounds with these corners, relative to `origin`.
+pub fn areas_of_light(light: &Light, name: &str, corners: &[DVec3; 8], origin: DVec3) -> Vec<InfluenceArea> {
+    let position = light.position - origin;
+    match light.kind {
+        LightKind::Directional { .. } => vec![InfluenceArea::around(name.to_owned(), light.direction, corners)],
+        LightKind::Spot { outer_angle, .. } if f64::from(outer_angle) < WIDEST.to_radians() => {
+            let view = View::new(position, light.direction, DVec2::splat(f64::from(outer_angle).tan()));
+            InfluenceArea::of_view(name.to_owned(), view, 0.0, corners).into_iter().collect()
+        }
+        _ => InfluenceArea::around_point(name, position, corners),
+    }
 }
 
 /// Influence areas of recorded rays within bounds: a box where all have one direction, one frustum

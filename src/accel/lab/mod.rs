@@ -5,6 +5,7 @@
 
 pub mod analysis;
 pub mod body;
+pub mod budget;
 pub mod build;
 pub mod builder;
 pub mod cells;

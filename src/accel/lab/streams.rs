@@ -11,7 +11,7 @@ use super::projection::frame;
 use super::traverse::{Hierarchy, LabHit, Query, Visits};
 use crate::sampling::sobol::hash_combine;
 use crate::sampling::to_unit;
-use crate::scene::{Camera, LightKind, Projection, Scene};
+use crate::scene::{Camera, Light, LightKind, Projection, Scene};
 
 /// Rays, and the query that is asked of them.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ pub fn image_streams(
     ao_radius: f64,
 ) -> Vec<RayStream> {
     let camera = camera_rays(camera, origin, size);
-    let seen: Vec<(DVec3, DVec3)> = camera.par_iter().filter_map(|r| hierarchy.surface(r)).collect();
+    let seen = surfaces(hierarchy, &camera);
     let from_all = |name: &str, query, ray: &(dyn Fn(usize, DVec3, DVec3) -> Option<LabRay> + Sync)| RayStream {
         name: name.to_owned(),
         query,
@@ -100,13 +100,10 @@ pub fn image_streams(
     };
 
     // lights of both kinds
-    let is_sun = |k: &LightKind| matches!(k, LightKind::Directional { .. });
-    let sun = scene.lights.iter().find(|l| is_sun(&l.kind)).map(|l| -l.direction);
-    let to_sun = sun.unwrap_or(DVec3::new(0.3, 1.0, 0.2)).normalize();
-    let lamp = scene.lights.iter().find(|l| !is_sun(&l.kind)).map(|l| l.position - origin);
-    let middle =
-        corners(scene, origin).map_or(DVec3::ZERO, |c| c[0] * 0.5 + c[7] * 0.5 + DVec3::Y * (c[7].y - c[0].y) * 0.4);
-    let lamp = lamp.unwrap_or(middle);
+    let is_sun = |l: &&Light| matches!(l.kind, LightKind::Directional { .. });
+    let [own_sun, own_lamp] = usual_lights(scene);
+    let to_sun = -scene.lights.iter().find(is_sun).unwrap_or(&own_sun).direction.normalize();
+    let lamp = scene.lights.iter().find(|l| !is_sun(l)).unwrap_or(&own_lamp).position - origin;
 
     let sun_ray = |_, p: DVec3, n: DVec3| (n.dot(to_sun) > 0.0).then(|| LabRay::new(p, to_sun, 0.0, f64::INFINITY));
     let lamp_ray = |_, p: DVec3, n: DVec3| (n.dot(lamp - p) > 0.0).then(|| LabRay::new(p, lamp - p, 0.0, 1.0));
@@ -121,6 +118,49 @@ pub fn image_streams(
     out.insert(0, RayStream { name: "camera".into(), query: Query::Closest, rays: camera });
     out.retain(|s| !s.rays.is_empty());
     out
+}
+
+/// The lights of a scene that has none: a sun from above, and a lamp in its upper part.
+pub fn usual_lights(scene: &Scene) -> [Light; 2] {
+    let (lo, hi) = scene.bounds().unwrap_or_default();
+    let light = |name: &str, kind, position| Light {
+        name: name.to_owned(),
+        kind,
+        intensity: glam::Vec3::ONE,
+        position,
+        direction: -DVec3::new(0.3, 1.0, 0.2).normalize(),
+        range: f64::INFINITY,
+    };
+    let upper = lo * 0.5 + hi * 0.5 + DVec3::Y * (hi.y - lo.y) * 0.4;
+    [
+        light("sun from above", LightKind::Directional { angle: 0.0 }, DVec3::ZERO),
+        light("lamp in the upper part", LightKind::Point, upper),
+    ]
+}
+
+/// The points that rays meet, a little off the surface, each with the normal on the ray's side.
+pub fn surfaces(hierarchy: &Hierarchy, rays: &[LabRay]) -> Vec<(DVec3, DVec3)> {
+    rays.par_iter().filter_map(|r| hierarchy.surface(r)).collect()
+}
+
+/// The shadow rays to a light from points with their normals, where the light reaches them but for
+/// what is between. Points are relative to `origin`.
+pub fn shadow_rays(seen: &[(DVec3, DVec3)], light: &Light, origin: DVec3) -> Vec<LabRay> {
+    let ray = |&(p, n): &(DVec3, DVec3)| {
+        let (to_light, tmax) = match light.kind {
+            LightKind::Directional { .. } => (-light.direction, f64::INFINITY),
+            _ => (light.position - origin - p, 1.0),
+        };
+        let is_in_cone = match light.kind {
+            LightKind::Spot { outer_angle, .. } => {
+                to_light.dot(-light.direction) >= f64::from(outer_angle).cos() * to_light.length()
+            }
+            _ => true,
+        };
+        let is_in_range = tmax.is_infinite() || to_light.length() <= light.range;
+        (n.dot(to_light) > 0.0 && is_in_cone && is_in_range).then(|| LabRay::new(p, to_light, 0.0, tmax))
+    };
+    seen.par_iter().filter_map(ray).collect()
 }
 
 /// A direction about a normal, cosine-distributed; `k`: its first number.

@@ -73,8 +73,21 @@ impl LabHit {
 
 /// Finds the hit of a ray with a body by a tree over its primitives, or over some of them.
 pub fn trace(tree: &Bvh2, body: &Body, ray: &LabRay, query: Query, visits: &mut Visits) -> Option<LabHit> {
+    trace_seen(tree, body, ray, query, visits, &|_| ())
+}
+
+/// As [`trace`], and calls `seen` with each node that is visited: inner nodes whose children are
+/// tested, and leaves whose primitives are.
+fn trace_seen(
+    tree: &Bvh2,
+    body: &Body,
+    ray: &LabRay,
+    query: Query,
+    visits: &mut Visits,
+    seen: &impl Fn(usize),
+) -> Option<LabHit> {
     let mut found: Option<LabHit> = None;
-    walk(tree, body.pad, ray, query, visits, &mut |primitive, visits, until| {
+    walk(tree, body.pad, ray, query, visits, seen, &mut |primitive, visits, until| {
         visits.primitives += 1;
         // at the same distance the lower number wins, so that equal distances have to be seen
         let ray = ray.between(ray.tmin, if found.is_some() { until.next_up() } else { ray.tmax });
@@ -88,12 +101,14 @@ pub fn trace(tree: &Bvh2, body: &Body, ray: &LabRay, query: Query, visits: &mut 
 
 /// Leads a ray through a tree: calls `leaf` with each index of a leaf that it meets, the counts,
 /// and the distance up to which hits count; it returns the distance of the closest hit so far.
+/// Calls `seen` with each node that is visited.
 fn walk(
     tree: &Bvh2,
     pad: f64,
     ray: &LabRay,
     query: Query,
     visits: &mut Visits,
+    seen: &impl Fn(usize),
     leaf: &mut dyn FnMut(u32, &mut Visits, f64) -> Option<f64>,
 ) {
     let Some(root) = tree.nodes.first() else { return };
@@ -108,6 +123,7 @@ fn walk(
         if entry > closest && query != Query::Exhaustive {
             continue;
         }
+        seen(at);
         let node = &tree.nodes[at];
         let first = node.first_index as usize;
         if node.is_leaf() {
@@ -150,24 +166,42 @@ pub struct Hierarchy {
 impl Hierarchy {
     /// Finds the hit of a ray.
     pub fn trace(&self, ray: &LabRay, query: Query, visits: &mut Visits) -> Option<LabHit> {
+        self.trace_seen(ray, query, visits, &|_, _| ())
+    }
+
+    /// As [`Hierarchy::trace`], and calls `seen` with each node that is visited: its index in the
+    /// tree of the instance's group, without an instance in [`Hierarchy::root_tree`].
+    pub fn trace_seen(
+        &self,
+        ray: &LabRay,
+        query: Query,
+        visits: &mut Visits,
+        seen: &impl Fn(Option<u32>, usize),
+    ) -> Option<LabHit> {
         let Some((top, pad)) = &self.top else {
             let (tree, body) = self.groups.first()?;
-            return trace(tree, body, ray, query, visits);
+            return trace_seen(tree, body, ray, query, visits, &|node| seen(None, node));
         };
         let mut found: Option<LabHit> = None;
-        walk(top, *pad, ray, query, visits, &mut |instance, visits, until| {
+        walk(top, *pad, ray, query, visits, &|node| seen(None, node), &mut |instance, visits, until| {
             visits.instances += 1;
             let (group, to_group) = &self.instances[instance as usize];
             let (tree, body) = &self.groups[*group];
             let is_first = found.is_none() || query == Query::Exhaustive;
             let until = if is_first { ray.tmax } else { until.next_up() };
             let local = ray.between(ray.tmin, until).transformed(to_group);
-            if let Some(hit) = trace(tree, body, &local, query, visits) {
+            let hit = trace_seen(tree, body, &local, query, visits, &|node| seen(Some(instance), node));
+            if let Some(hit) = hit {
                 found = Some(LabHit { instance, ..hit }.closer(found));
             }
             found.map(|h| h.t)
         });
         found
+    }
+
+    /// The tree that traversal begins with: the top level, or that of the only group.
+    pub fn root_tree(&self) -> Option<&Bvh2> {
+        self.top.as_ref().map(|(top, _)| top).or_else(|| self.groups.first().map(|(tree, _)| tree))
     }
 
     /// Visits of many rays together, and how many of them hit something.

@@ -10,7 +10,7 @@ use crate::tracer::stream::LAUNCH_RAYS;
 pub const VIEW: DebugView = DebugView {
     reads: &[Resource::Camera, Resource::Scene],
     has_counts: true,
-    middle: 16.0,
+    middle: NodeVisits::MIDDLE,
     ranges: |block| Range::launches(block.rays(), 1, LAUNCH_RAYS),
     pipeline: |tracer, shader| tracer.counting_kernel(shader, "--show nodes"),
     ..DebugView::OF_PIXELS
@@ -26,6 +26,9 @@ pub struct NodeVisits {
 }
 
 impl NodeVisits {
+    /// Number of nodes at the middle of the colours.
+    pub const MIDDLE: f32 = 16.0;
+
     /// Reads the counts of the last frame that displayed them, for `pixels` pixels.
     pub fn read(resources: &Resources, pixels: u64) -> Result<Self> {
         let nodes: Vec<u32> = resources.read(Resource::DebugCounts, pixels)?;

@@ -6,6 +6,7 @@
 pub mod analytic;
 mod assemble;
 pub mod atrium;
+pub mod city;
 pub mod cornell;
 pub mod many;
 pub mod moving_box;
@@ -57,6 +58,7 @@ const NAMES: &[BuiltinInfo] = &[
     info("grid", "N x N x N rotated and scaled instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
     info("spheres", "N random analytic spheres over a floor (spheres:N, 1 to 10000000, default 1000)"),
     info("terrain", "a fractal landscape of N triangles (terrain:N, 2 to 100000000, default 100000)"),
+    info("city", "quarters of houses, about N triangles in boxes (city:N, 100 to 20000000, default 100000)"),
     info(
         "instances",
         "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)",
@@ -122,6 +124,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "room" => return with(room::room, between(40_000, 10_000, 5_000_000)),
         "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
         "terrain" => return with(terrain::terrain, between(100_000, 2, 100_000_000)),
+        "city" => return with(city::city, between(100_000, 100, 20_000_000)),
         "instances" => return with(terrain::instances, between(1_000_000, 250, 500_000_000)),
         _ if parameter.is_some() => return None,
         _ => {}

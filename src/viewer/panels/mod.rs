@@ -2,6 +2,7 @@
 
 mod dialogs;
 mod editor;
+mod hierarchy;
 mod menu;
 mod performance;
 mod scene;

@@ -4,7 +4,7 @@
 use egui::{CollapsingHeader, ComboBox, Response, Ui};
 
 use super::slider::Scale;
-use super::{editor, performance, scene, slider};
+use super::{editor, hierarchy, performance, scene, slider};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::Camera;
 use crate::scene::environments::BuiltinEnvironment;
@@ -157,6 +157,8 @@ fn quality(app: &mut App, ui: &mut Ui) {
 /// Settings that are for research and comparisons, of all that is rendered.
 fn research(app: &mut App, ui: &mut Ui) {
     ui.weak("For comparisons of methods. The pipelines of Larsen (2019) are in the list of View.");
+    hierarchy::show(app, ui);
+    ui.separator();
     frames(app, ui, &is_research);
     let ao = app.settings.integrators.ao.editable().into_iter().filter(is_research).collect();
     editor::edit(ui, ao, &serde_json::json!({ "ao_normal": "geometric" }));

@@ -5,6 +5,7 @@ use egui::{
     Stroke, Ui, Vec2,
 };
 
+use super::hierarchy;
 use super::menu::{self, shortcuts};
 use crate::realtime::Preset;
 use crate::viewer::app::{App, Arrangement};
@@ -181,7 +182,9 @@ pub fn show(app: &mut App, ui: &mut Ui) {
         }
         None => layer(app, app.shows_second, area),
     }
+    hierarchy::overlay(app, ui, rect);
     outline(app, ui, rect, split);
+    hierarchy::legend(app, ui, rect);
     titles(app, ui, rect, split);
     hints(app, ui, rect);
     notices(app, ui, rect);
@@ -278,6 +281,7 @@ fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
         if response.double_clicked() {
             app.task(Task::Pick { at, purpose: PickPurpose::Focus });
         } else if response.clicked() {
+            app.remember_ray(at);
             app.task(Task::Pick { at, purpose: PickPurpose::Describe });
         }
     }

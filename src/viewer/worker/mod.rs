@@ -16,6 +16,7 @@ use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
 use summary::summary;
 
+use super::hierarchy::{self, FoundHierarchy, HierarchyKey, SceneHierarchy};
 use super::request::{
     Comparison, DeviceSummary, Event, EventSender, Mailbox, Outline, Progress, Request, SceneSummary, TRUTH, Task,
 };
@@ -94,7 +95,12 @@ struct OpenScene {
     device: DeviceSettings,
     /// Loader of its images, if they are still missing.
     loader: Option<Loader>,
+    /// The hierarchy that was shown last, and of what it is.
+    hierarchy: KnownHierarchy,
 }
+
+/// A hierarchy for the window, or why there is none; with what it depends on.
+type KnownHierarchy = Option<(HierarchyKey, Result<Arc<SceneHierarchy>, String>)>;
 
 impl Worker {
     fn run(mut self) {
@@ -149,7 +155,8 @@ impl Worker {
                 // before the new one is uploaded: memory
                 self.open = None;
                 let renderer = Renderer::new(device, scene, &request.device)?.with_name(source);
-                self.open = Some(OpenScene { renderer, load: request.load, device: request.device.clone(), loader });
+                let (load, device, hierarchy) = (request.load, request.device.clone(), None);
+                self.open = Some(OpenScene { renderer, load, device, loader, hierarchy });
                 self.events.send(Event::Loaded(Box::new(summary)));
                 self.list_devices();
                 Ok(true)
@@ -203,7 +210,7 @@ impl Worker {
 
     /// Puts the scene with its images in place of its geometry alone, if they have been loaded.
     fn take_images(&mut self, source: &str) -> Result<()> {
-        let Some(OpenScene { renderer, load, device, loader: Some(mut loader) }) =
+        let Some(OpenScene { renderer, load, device, loader: Some(mut loader), hierarchy }) =
             self.open.take_if(|o| o.loader.is_some())
         else {
             return Ok(());
@@ -218,20 +225,21 @@ impl Worker {
                 let open = renderer.device().clone();
                 drop(renderer);
                 let renderer = Renderer::new(open, scene, &device)?.with_name(source);
-                self.open = Some(OpenScene { renderer, load, device, loader: None });
+                // masks may leave surfaces out
+                self.open = Some(OpenScene { renderer, load, device, loader: None, hierarchy: None });
                 self.events.send(Event::Loaded(Box::new(summary)));
                 return Ok(());
             }
             Some(Err(e)) => {
                 let text = crate::terminal::console::one_line(&e.to_string());
                 self.events.send(Event::LoadFailed(load, format!("images: {text}")));
-                self.open = Some(OpenScene { renderer, load, device, loader: None });
+                self.open = Some(OpenScene { renderer, load, device, loader: None, hierarchy });
                 return Ok(());
             }
             Some(Ok(Loaded::Geometry(_))) | None => {}
         }
         let loader = (!loader.has_ended()).then_some(loader);
-        self.open = Some(OpenScene { renderer, load, device, loader });
+        self.open = Some(OpenScene { renderer, load, device, loader, hierarchy });
         Ok(())
     }
 
@@ -247,7 +255,8 @@ impl Worker {
     /// Changes the tracer, or the device. Settings that the device does not support leave both as
     /// they were.
     fn set_device(&mut self, settings: &DeviceSettings) -> Result<()> {
-        let Some(OpenScene { renderer, load, device: before, loader }) = self.open.take_if(|o| o.device != *settings)
+        let Some(OpenScene { renderer, load, device: before, loader, hierarchy }) =
+            self.open.take_if(|o| o.device != *settings)
         else {
             return Ok(());
         };
@@ -271,7 +280,8 @@ impl Worker {
                 Renderer::new(device, scene, &before)?
             }
         };
-        self.open = Some(OpenScene { renderer: renderer.with_name(&name), load, device: settings.clone(), loader });
+        let (renderer, device) = (renderer.with_name(&name), settings.clone());
+        self.open = Some(OpenScene { renderer, load, device, loader, hierarchy });
         Ok(())
     }
 
@@ -342,6 +352,8 @@ impl Worker {
             knows_exposure: false,
             outlined: None,
             is_edited,
+            hierarchy: &mut open.hierarchy,
+            has_sent_hierarchy: false,
         };
         session.run()
     }
@@ -376,6 +388,10 @@ struct ViewerSession<'a> {
     is_edited: bool,
     /// The instance whose outline was sent since the view has moved.
     outlined: Option<usize>,
+    /// The hierarchy that was shown last.
+    hierarchy: &'a mut KnownHierarchy,
+    /// It was sent, with the influence areas of these lights.
+    has_sent_hierarchy: bool,
 }
 
 /// Whether an image at rest is black.
@@ -410,9 +426,12 @@ impl ViewerSession<'_> {
                 }
                 outcome?;
             }
+
+            // what goes with a view at rest, and the next step of an image
             let moves = self.last_motion.elapsed() < REST;
             if !moves {
                 self.outline(&request, &camera)?;
+                self.send_hierarchy(&request);
             }
             match self.next_pane(moves, &request) {
                 Some(k) => self.step(k, &request, number, changed, &camera, moves)?,
@@ -493,6 +512,28 @@ impl ViewerSession<'_> {
         self.outlined = Some(object);
         self.events.send(Event::Outline(Arc::new(Outline { object, camera: camera.clone(), time, size, lines })));
         Ok(())
+    }
+
+    /// Sends the hierarchy, if it is wanted, once: it is built once for each scene and build.
+    fn send_hierarchy(&mut self, request: &Request) {
+        if !request.hierarchy || std::mem::replace(&mut self.has_sent_hierarchy, true) {
+            return;
+        }
+        let key = HierarchyKey::of_request(request);
+        let scene = self.interactive.scene();
+        // poses refit the trees, and may move lights
+        let is_at_rest = request.animation.is_none();
+        let known = self.hierarchy.take().filter(|(of, _)| *of == key).map(|(_, tree)| tree);
+        let tree = known.unwrap_or_else(|| {
+            if is_at_rest {
+                SceneHierarchy::build(scene, &request.device).map(Arc::new)
+            } else {
+                Err("The hierarchy is not shown while an animation is chosen: its poses refit the trees.".into())
+            }
+        });
+        *self.hierarchy = Some((key.clone(), tree.clone()));
+        let areas = if is_at_rest { hierarchy::areas(scene, request.aspect()) } else { Vec::new() };
+        self.events.send(Event::Hierarchy(Box::new(FoundHierarchy { key, tree, areas })));
     }
 
     /// Creates the panes that are requested and keeps those that are there.
