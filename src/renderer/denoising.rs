@@ -109,6 +109,7 @@ impl<'a> Denoising<'a> {
     pub fn report(&self) -> DenoiseReport {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
         DenoiseReport {
+            name: name.to_string(),
             line: format!(
                 "denoised by {name} ({}): the image is biased; an .exr keeps the noisy image as {}",
                 self.chosen.summary,
@@ -130,6 +131,8 @@ impl<'a> Denoising<'a> {
 /// The report of a denoiser, for people and for programs.
 #[derive(Clone, Debug)]
 pub struct DenoiseReport {
+    /// Name of the denoiser.
+    pub name: String,
     /// A line for people.
     pub line: String,
     /// A line for `--explain`.

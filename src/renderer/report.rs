@@ -311,7 +311,9 @@ impl StillReport {
         let trace = self.seconds.parts.iter().find(|(name, _)| *name == "trace");
         let trace = trace.map_or_else(String::new, |(_, s)| format!(", {s:.3} of them tracing"));
         let error = self.film.error.as_ref().map_or_else(String::new, |error| format!("; {error}"));
-        let denoised = if self.denoise.is_some() { "; denoised, which is biased" } else { "" };
+        let denoised = self.denoise.as_ref().map_or_else(String::new, |d| format!("; denoised by {} (biased)", d.name));
+        let surfaces =
+            self.surface_mean.map_or_else(String::new, |mean| format!(", {mean:.5} where the scene is seen"));
         vec![
             format!(
                 "{outputs}: {width}x{height}, {samples} spp{stopped}, {}, on {}{}",
@@ -320,7 +322,12 @@ impl StillReport {
                 self.setup.chosen_text()
             ),
             format!("{:.3} seconds{trace}", self.seconds.total),
-            format!("mean {} {:.5}{}{error}{denoised}", self.quantity, self.mean, error_text(self.mean_standard_error)),
+            format!(
+                "mean {} {:.5}{}{surfaces}{error}{denoised}",
+                self.quantity,
+                self.mean,
+                error_text(self.mean_standard_error)
+            ),
         ]
     }
 
