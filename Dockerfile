@@ -1,4 +1,4 @@
-# skylit and Mesa's CPU driver: an image that renders and verifies reference frames on machines without a GPU (docs/ci.md).
+# skylit and Mesa's CPU driver: an image that renders and verifies reference frames on machines without a GPU (docs/guide/ci.md).
 #
 #   docker build -t skylit .
 #   docker run --rm -v "$PWD:/work" skylit verify tests/frames --junit frames.xml

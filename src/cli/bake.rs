@@ -415,8 +415,8 @@ impl ModelFile {
     }
 }
 
-/// The settings of baking, with a radius in scene units, sentences on what was chosen, and the light
-/// besides the scene's.
+/// The settings of baking, with a radius in scene units, sentences on what was chosen, and the
+/// light besides the scene's.
 fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>, LightingSettings)> {
     renderer.apply_scene_settings(&args.meaning)?;
     let bounds = renderer.scene().bounds();

@@ -184,7 +184,7 @@ impl FileSettings {
             (self.background, outputs.iter().find(|p| AnimationFormat::from_path(p) == Some(AnimationFormat::Mp4)))
         {
             return Err(Error::Usage(format!(
-                "--background transparent: {} cannot have alpha; write .webm or .apng, or give a colour R,G,B",
+                "--background transparent: {} cannot have alpha; write .webm, .apng or .gif, or give a colour R,G,B",
                 video.display()
             )));
         }

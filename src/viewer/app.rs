@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
+use super::baking::{BakePlace, BakeWanted, BakedMap, BakedModel};
 use super::browse::Browsing;
 use super::camera::CameraControl;
 use super::dialog::{Dialog, RenderWanted, RenderedMotion};
@@ -55,6 +56,9 @@ const TURNTABLE_FRAMES: u32 = 120;
 const TURNTABLE_LEAD_IN: u32 = 30;
 /// Frames per second of an animation that is rendered, the default of `skylit render`.
 const ANIMATION_FPS: f64 = 30.0;
+/// Width and height of a texture that is baked, texels, and samples: the defaults of `skylit bake`.
+const BAKE_SIZE: u32 = 1024;
+const BAKE_SPP: u32 = 64;
 /// Offset of the truth's seed from that of the images.
 const TRUTH_SEED: u32 = 0x7275_7468;
 
@@ -237,6 +241,8 @@ pub struct App {
     size: [u32; 2],
     layers: Vec<Layer>,
     pub renders: Vec<Render>,
+    /// A model that was baked and is being opened.
+    baked: Option<BakedModel>,
     /// The program that renders: this one.
     pub program: PathBuf,
 }
@@ -309,6 +315,7 @@ impl App {
             size: [0; 2],
             layers: Vec::new(),
             renders: Vec::new(),
+            baked: None,
             program: std::env::current_exe().unwrap_or_else(|_| PathBuf::from("skylit")),
         };
 
@@ -612,7 +619,9 @@ impl App {
     }
 
     fn loaded(&mut self, summary: SceneSummary) {
-        let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
+        // a model that was baked is seen as what it is made of was
+        let baked = self.baked.take_if(|baked| baked.load == summary.load);
+        let is_same = baked.is_some() || self.scene.as_ref().is_some_and(|s| s.source == summary.source);
         let is_same_load = self.scene.as_ref().is_some_and(|s| s.load == summary.load);
         let lacked_images = self.scene.as_ref().is_some_and(|s| s.load == summary.load && !s.is_complete);
         let what = if lacked_images && summary.is_complete {
@@ -672,6 +681,9 @@ impl App {
         }
         self.forget_missing(&summary);
         self.scene = Some(summary);
+        if let Some(baked) = baked {
+            self.show_baked(&baked);
+        }
     }
 
     /// Shows the scene at the exposure that its own light needs, unless there is one already.
@@ -1294,7 +1306,7 @@ impl App {
         // defaults are among the settings already
         let fixed = [source, "--no-config".into(), "-o".into(), output.to_owned()];
         let arguments: Vec<String> = fixed.into_iter().chain(self.load_flags()).chain(settings.flags()).collect();
-        self.start("render", &arguments, output);
+        self.start("render", &arguments, output, None);
     }
 
     /// Runs `skylit export` with the scene as it is shown, as a program of its own.
@@ -1303,13 +1315,90 @@ impl App {
         let settings = RenderSettings { scene: self.settings.scene.clone(), ..RenderSettings::default() };
         let fixed = [scene.source.clone(), "-o".into(), output.to_owned()];
         let arguments: Vec<String> = fixed.into_iter().chain(self.load_flags()).chain(settings.flags()).collect();
-        self.start("export", &arguments, output);
+        self.start("export", &arguments, output, None);
+    }
+
+    /// Numbers of baking unless the user says otherwise: the radius is that of the view.
+    pub fn default_bake(&self) -> BakeWanted {
+        BakeWanted {
+            place: BakePlace::Texture,
+            image_map: BakedMap::Ao,
+            size: BAKE_SIZE,
+            spp: BAKE_SPP,
+            radius: self.settings.integrators.ao.radius(),
+            share: None,
+            is_denoised: false,
+            has_ground: false,
+            is_shown: true,
+        }
+    }
+
+    /// Runs `skylit bake` with the scene as it is shown, as a program of its own.
+    pub fn bake(&mut self, output: &str, wanted: &BakeWanted) {
+        let Some(scene) = &self.scene else { return };
+        let source = scene.source.clone();
+
+        // what the view has of radius, falloff and light
+        let mut settings = RenderSettings { scene: self.settings.scene.clone(), ..RenderSettings::default() };
+        let falloff = self.settings.integrators.ao.ao_falloff;
+        settings.integrators.ao.ao_radius = wanted.length();
+        if wanted.map().has_radius() {
+            settings.integrators.ao.ao_falloff = falloff;
+        }
+        if wanted.map() == BakedMap::Light {
+            settings.lighting = self.lighting.clone();
+            settings.integrators.path.max_depth = self.settings.integrators.path.max_depth;
+        }
+
+        // the program, and the model to show once it is there
+        let fixed = [source.clone(), "-o".into(), output.to_owned()];
+        let arguments = fixed.into_iter().chain(self.load_flags()).chain(wanted.flags()).chain(settings.flags());
+        let ao = (Length::Units(wanted.radius), falloff);
+        let baked = BakedModel { source, output: output.to_owned(), place: wanted.place, ao, load: 0 };
+        let is_shown = wanted.is_shown && wanted.place != BakePlace::Image;
+        self.start("bake", &arguments.collect::<Vec<_>>(), output, is_shown.then_some(baked));
+    }
+
+    /// Opens a model that was baked, unless another scene was opened meanwhile.
+    fn open_baked(&mut self, mut baked: BakedModel) {
+        if self.source.as_ref() != Some(&baked.source) {
+            return;
+        }
+        let gltf_scene = self.gltf_scene.clone();
+        if baked.is_amended() {
+            self.open(&baked.output);
+            self.gltf_scene = gltf_scene;
+        } else {
+            // the file has what settings made of the scene
+            (self.geometry, self.settings.scene) = Default::default();
+            self.open(&baked.output);
+        }
+        baked.load = self.load;
+        self.baked = Some(baked);
+    }
+
+    /// Shows what was baked on the left, and traced ambient occlusion on the right.
+    fn show_baked(&mut self, baked: &BakedModel) {
+        self.first = IntegratorName::find(baked.integrator()).map_or(self.first, Technique::Still);
+        self.second = if baked.place == BakePlace::Texture {
+            self.choose_truth(Some(Technique::Converged));
+            Second::Truth
+        } else {
+            // colours are not the same quantity, and have no error
+            Second::Technique(Technique::Converged)
+        };
+        (self.arrangement, self.shows_second) = (Arrangement::Split(0.5), false);
+        let ao = &mut self.settings.integrators.ao;
+        (ao.ao_radius, ao.ao_falloff) = (Some(baked.ao.0), baked.ao.1);
+        // the rest pose is baked
+        self.playback = Playback { animation: None, runs: false, time: 0.0, ..self.playback };
     }
 
     /// Starts this program with a command, of which the status line tells.
-    fn start(&mut self, command: &'static str, arguments: &[String], output: &str) {
+    fn start(&mut self, command: &'static str, arguments: &[String], output: &str, baked: Option<BakedModel>) {
         match Render::start(&self.program, command, arguments, output) {
-            Ok(render) => {
+            Ok(mut render) => {
+                render.baked = baked;
                 self.report(format!("{command}: {output}"), false);
                 self.renders.push(render);
             }
@@ -1319,14 +1408,20 @@ impl App {
 
     /// Tells of renders that have ended.
     fn watch_renders(&mut self, context: &egui::Context) {
-        let mut messages = Vec::new();
+        let (mut messages, mut baked) = (Vec::new(), None);
         self.renders.retain_mut(|render| {
             let ended = render.ended();
             let goes_on = ended.is_none();
             messages.extend(ended);
+            if render.has_succeeded() {
+                baked = render.baked.take().or(baked.take());
+            }
             goes_on
         });
         messages.into_iter().for_each(|(text, is_error)| self.report(text, is_error));
+        if let Some(baked) = baked {
+            self.open_baked(baked);
+        }
         if !self.renders.is_empty() {
             context.request_repaint_after(Duration::from_millis(200));
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::task::Poll;
 
+use super::baking::BakePlace;
 use super::dialog::Dialog;
 
 /// The system's dialog while it is open. It runs on a thread of its own, so that the window stays
@@ -29,6 +30,10 @@ impl Browsing {
             Dialog::Render(..) => {
                 ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng", "mp4", "webm", "gif"])])
             }
+            Dialog::Bake(_, wanted) if wanted.place == BakePlace::Image => {
+                ("Bake this scene", &[("Images", &["png", "exr"])])
+            }
+            Dialog::Bake(..) => ("Bake this scene", &[("glTF", &["glb", "gltf"])]),
         };
         let name = dialog.text_mut().clone();
         let saves = !matches!(dialog, Dialog::Open(_) | Dialog::LoadSettings(_));

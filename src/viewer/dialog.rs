@@ -1,5 +1,7 @@
 //! Windows that ask the user for something.
 
+use super::baking::BakeWanted;
+
 /// A window that asks for something.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Dialog {
@@ -15,6 +17,8 @@ pub enum Dialog {
     Export(String),
     /// For the output of `skylit render`, and its settings.
     Render(String, RenderWanted),
+    /// For the output of `skylit bake`, and its settings.
+    Bake(String, BakeWanted),
 }
 
 /// Numbers that `skylit render` is asked for. Of each motion it has the numbers that apply to it.
@@ -51,7 +55,8 @@ impl Dialog {
             | Self::LoadSettings(text)
             | Self::SaveSettings(text)
             | Self::Export(text)
-            | Self::Render(text, _) => text,
+            | Self::Render(text, _)
+            | Self::Bake(text, _) => text,
         }
     }
 }

@@ -1,10 +1,12 @@
-//! Renders beside the window: `skylit render` as a program of its own, with its progress; and
-//! `skylit export` likewise.
+//! Renders beside the window: `skylit render` as a program of its own, with its progress;
+//! `skylit export` and `skylit bake` likewise.
 
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+
+use super::baking::BakedModel;
 
 /// Seconds between two lines of progress.
 const PROGRESS_SECONDS: &str = "0.25";
@@ -15,6 +17,8 @@ const INTERRUPTED: i32 = 130;
 pub struct Render {
     /// The file that it writes.
     pub output: String,
+    /// The model that is shown once it has been baked.
+    pub baked: Option<BakedModel>,
     command: &'static str,
     child: Child,
     heard: Arc<Mutex<Heard>>,
@@ -71,7 +75,7 @@ impl Render {
             std::thread::Builder::new().name("render".into()).spawn(listen)
         });
         let listener = listener.transpose()?;
-        Ok(Self { output: output.to_owned(), command, child, heard, listener, is_cancelled: false })
+        Ok(Self { output: output.to_owned(), baked: None, command, child, heard, listener, is_cancelled: false })
     }
 
     /// Share that is done, and how long it has taken and will take; `None` before it is known.
@@ -92,6 +96,20 @@ impl Render {
         let _ = self.child.kill();
     }
 
+    /// Words for what it is doing, and for what it has done.
+    pub fn verbs(&self) -> [&'static str; 2] {
+        match self.command {
+            "export" => ["exporting", "exported"],
+            "bake" => ["baking", "baked"],
+            _ => ["rendering", "rendered"],
+        }
+    }
+
+    /// Returns true once it has ended without an error.
+    pub fn has_succeeded(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(Some(status)) if status.success())
+    }
+
     /// Returns what is to be said once it has ended, and whether that is an error.
     pub fn ended(&mut self) -> Option<(String, bool)> {
         let status = match self.child.try_wait() {
@@ -105,8 +123,7 @@ impl Render {
         }
         let output = &self.output;
         if status.success() {
-            let done = if self.command == "export" { "exported" } else { "rendered" };
-            return Some((format!("{done} {output}"), false));
+            return Some((format!("{} {output}", self.verbs()[1]), false));
         }
         if self.is_cancelled || status.code() == Some(INTERRUPTED) {
             return Some((format!("{output} was cancelled"), false));

@@ -62,8 +62,7 @@ impl Technique {
             Self::Still(integrator) if integrator.can(Capability::WhiteSky) => {
                 format!("AO truth ({})", integrator.name())
             }
-            // of views that are no colours there are buffers, too
-            Self::Still(integrator) if self.is_view_of_surfaces() && !integrator.can(Capability::ToneMapping) => {
+            Self::Still(integrator) if self.is_view_of_surfaces() && self.has_buffer() => {
                 format!("{}, antialiased", word(integrator.name()))
             }
             Self::Still(integrator) => word(integrator.name()),
@@ -89,6 +88,12 @@ impl Technique {
     fn is_view_of_surfaces(self) -> bool {
         let Self::Still(integrator) = self else { return false };
         !integrator.can(Capability::AmbientVisibility) && !integrator.can(Capability::LightTransport)
+    }
+
+    /// Returns true for views that are buffers of frames, too.
+    fn has_buffer(self) -> bool {
+        // `normals` is the buffer `normal`
+        DisplayMode::ALL.iter().any(|mode| self.integrator().name().starts_with(mode.name()))
     }
 
     /// Returns true for images of the light of a scene, which a camera would see.

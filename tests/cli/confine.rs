@@ -114,6 +114,10 @@ fn buffers_and_images_of_gltf() {
     place.refuses("other/s.gltf", "../secret.png");
     scene("own.bin", "own.png");
     place.accepts("other/s.gltf");
+    // the scene's own file is no way out, either
+    gltf(place.top.path(), "outside.gltf", "scene/own.bin", "scene/own.png");
+    symlink("../outside.gltf", place.scene("linked.gltf")).unwrap();
+    place.refuses("scene/linked.gltf", "a link that leads out of its folder");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+#[cfg(feature = "bake")]
+mod bake;
 mod hierarchy;
 mod images;
 mod layer;

@@ -882,18 +882,25 @@ fn environments_are_chosen_and_turned() {
     assert_eq!((lighting.environment, lighting.environment_turn, lighting.environment_scale), (None, None, None));
 }
 
+/// Writes a program that is `script`. Another process writes it: a file that this one has open for writing would be so in the programs that other
+/// tests start meanwhile, too, and could not be started.
+#[cfg(unix)]
+pub fn write_program(program: &std::path::Path, script: &str) {
+    let mut command = std::process::Command::new("sh");
+    command
+        .args(["-c", "printf '#!/bin/sh\\n%s\\n' \"$2\" > \"$1\" && chmod +x \"$1\"", "sh"])
+        .arg(program)
+        .arg(script);
+    assert!(command.status().unwrap().success());
+}
+
 /// A render is asked for with its size, samples and frames; it shows how far it is, and can be cancelled.
 #[cfg(unix)]
 #[test]
 fn renders_are_asked_for_watched_and_cancelled() {
-    use std::os::unix::fs::PermissionsExt;
-
     let dir = tempfile::tempdir().unwrap();
     let program = dir.path().join("program");
-    let is = |script: &str| {
-        std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
-        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
-    };
+    let is = |script: &str| write_program(&program, script);
     let told = dir.path().join("told");
     let output = dir.path().join("a.apng").to_string_lossy().into_owned();
     let mut alone = loaded();

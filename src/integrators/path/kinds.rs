@@ -269,8 +269,8 @@ impl Integrator for PathVariant {
         Ok(Rendered { image: result.image, report, ..Default::default() })
     }
 
-    /// Tone maps radiance, maps normals from -1..1 to 0..1, divides depths by their maximum; what is
-    /// baked is shown as what is traced.
+    /// Tone maps radiance, maps normals from -1..1 to 0..1, divides depths by their maximum; what
+    /// is baked is shown as what is traced.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image {
         let shown = |f: &dyn Fn(f32) -> f32| {
             let mut out = image.clone();

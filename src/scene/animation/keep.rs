@@ -64,7 +64,7 @@ impl AnimationRig {
     /// Turns all that has a node, by a node above all others. The scene shows it from the next
     /// [`AnimationRig::apply_rest_pose`] on.
     pub(in crate::scene) fn turn(&mut self, rotation: DQuat) {
-        // parents come before their children: the new node is the first, and all indices grow by one
+        // parents come before children: the new node is the first, and all indices grow by one
         let parts = &mut self.parts;
         for node in &mut parts.nodes {
             node.parent = Some(node.parent.map_or(0, |p| p + 1));

@@ -23,14 +23,20 @@ impl Confine<'_> {
     /// anywhere.
     ///
     /// # Errors
-    /// [`Error::Input`] for a folder that does not exist.
+    /// [`Error::Input`] for a folder that does not exist, and for a scene's file that is a link
+    /// which leads out of its folder.
     pub fn folder_for(self, scene: &Path) -> Result<Option<PathBuf>> {
         let folder = match self {
             Self::Nowhere => return Ok(None),
             Self::SceneFolder => folder_of(scene),
             Self::Folder(folder) => folder,
         };
-        fs::canonicalize(folder).map(Some).map_err(|e| Error::read(folder, &e))
+        let folder = fs::canonicalize(folder).map_err(|e| Error::read(folder, &e))?;
+        // a file that is missing is reported by whoever reads it
+        if fs::canonicalize(scene).is_ok_and(|path| !path.starts_with(&folder)) {
+            return Err(Error::input(scene, "is a link that leads out of its folder, which --confine does not allow"));
+        }
+        Ok(Some(folder))
     }
 }
 

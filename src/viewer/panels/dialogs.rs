@@ -6,9 +6,11 @@ use std::task::Poll;
 
 use egui::{Align2, Context, Key, Ui};
 
+use super::bake;
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
 use crate::viewer::app::{App, Second};
+use crate::viewer::baking::BakePlace;
 use crate::viewer::browse::Browsing;
 use crate::viewer::dialog::{Dialog, RenderWanted, RenderedMotion};
 use crate::viewer::request::Task;
@@ -113,6 +115,10 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
             "A file: .png, .exr, .jpg, .webp, .apng, .mp4, .webm, .gif or frames.####.png",
             "Render",
         ),
+        Dialog::Bake(_, wanted) if wanted.place == BakePlace::Image => {
+            ("Bake this scene", "A file: .png, .exr", "Bake")
+        }
+        Dialog::Bake(..) => ("Bake this scene", "A file: .glb, .gltf", "Bake"),
     };
 
     // its window: a path, and the action as a button
@@ -132,6 +138,9 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
             done = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
             if let Dialog::Render(_, wanted) = &mut dialog {
                 render_numbers(app, ui, wanted);
+            }
+            if let Dialog::Bake(text, wanted) = &mut dialog {
+                bake::numbers(app, ui, text, wanted);
             }
             ui.horizontal(|ui| {
                 done |= ui.button(action).clicked();
@@ -199,7 +208,11 @@ fn render_numbers(app: &App, ui: &mut Ui, wanted: &mut RenderWanted) {
 }
 
 fn act(app: &mut App, dialog: Dialog) {
-    if let Dialog::Save(text) | Dialog::SaveSettings(text) | Dialog::Export(text) | Dialog::Render(text, _) = &dialog
+    if let Dialog::Save(text)
+    | Dialog::SaveSettings(text)
+    | Dialog::Export(text)
+    | Dialog::Render(text, _)
+    | Dialog::Bake(text, _) = &dialog
         && let Some(scene) = &app.scene
     {
         let mut plan = FilePlan::default();
@@ -220,6 +233,7 @@ fn act(app: &mut App, dialog: Dialog) {
         }
         Dialog::Export(text) => app.export(text.trim()),
         Dialog::Render(text, wanted) => app.render(text.trim(), &wanted),
+        Dialog::Bake(text, wanted) => app.bake(text.trim(), &wanted),
         Dialog::LoadSettings(text) => match app.load_settings(Path::new(text.trim())) {
             Ok(()) => app.report(format!("loaded {}", text.trim()), false),
             Err(e) => app.report(e.to_string(), true),

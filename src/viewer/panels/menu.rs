@@ -2,6 +2,7 @@
 
 use egui::{Button, KeyboardShortcut, Ui};
 
+use super::bake;
 use crate::renderer::interactive::ViewPicture;
 use crate::scene::builtin;
 use crate::viewer::app::{App, Arrangement};
@@ -104,6 +105,13 @@ fn file(app: &mut App, ui: &mut Ui) {
             }
         });
     });
+    if cfg!(feature = "bake") {
+        ui.add_enabled_ui(app.scene.is_some(), |ui| {
+            if item(ui, "Bake…", None, "") {
+                app.dialog = Some(bake::dialog(app));
+            }
+        });
+    }
     if item(ui, "Copy the command that renders this view", None, "Ctrl+C") {
         copy_command(app);
     }

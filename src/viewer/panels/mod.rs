@@ -1,5 +1,6 @@
 //! The user interface: menu, side panel, status line, the images themselves, and windows over them.
 
+mod bake;
 mod dialogs;
 mod editor;
 mod hierarchy;

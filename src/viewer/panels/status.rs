@@ -48,7 +48,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
             let (share, rest) = render.progress().unwrap_or_default();
             let bar = egui::ProgressBar::new(share).desired_width(80.0).show_percentage();
             ui.add(bar);
-            ui.label(&render.output).on_hover_text(format!("rendering {} {rest}", render.output));
+            ui.label(&render.output).on_hover_text(format!("{} {} {rest}", render.verbs()[0], render.output));
             if ui.small_button("✖").on_hover_text(format!("Cancel {}", render.output)).clicked() {
                 render.cancel();
             }
