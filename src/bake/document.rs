@@ -57,14 +57,12 @@ pub fn save_textures(
         }
 
         // the texture, of the primitives' material
-        let is_within = |c: &glam::Vec2| c.cmpge(glam::Vec2::ZERO).all() && c.cmple(glam::Vec2::ONE).all();
-        let repeats = !texture.surfaces.iter().flat_map(|s| s.corners.iter().flatten()).all(is_within);
         let partner = images.are_packed.then(|| pack::partner(scene, texture).ok()).flatten();
         let png = match partner {
             Some(partner) => pack::png(map, partner)?,
             None => picture::png(map, settings, images.bits)?,
         };
-        let index = file.add_texture(&texture_name(texture), png, repeats);
+        let index = file.add_texture(&texture_name(texture), png, texture.repeats());
         let material = match texture.material {
             Some(material) => material,
             None => {

@@ -4,13 +4,15 @@ use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::cage::{Cage, CageFrames};
 use super::frames::{SurfaceFrames, SurfacePoint};
 use super::light::LightTracer;
 use super::plan::PlannedTexture;
+use super::seams::{SeamLookups, Seams};
 use super::smooth::{FilterTexel, smooth};
 use super::texels::{BAND, Layout, POINTS, TexelPoint};
 use super::trace::{BakePoint, PointSums, PointTracer, Sampling};
-use super::{BakeSettings, Map, Space, backfaces, fill};
+use super::{BakeSettings, Map, SeamTreatment, Space, backfaces, fill};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -43,6 +45,8 @@ pub struct BakedMap {
     pub error: f64,
     /// Bounds of positions.
     pub bounds: (Vec3, Vec3),
+    /// Differences at seams; `None` where there are none, and for directions in tangent space.
+    pub seams: Option<Seams>,
 }
 
 /// Sums over a texel's samples.
@@ -81,9 +85,8 @@ pub struct Traced<'a> {
     pub tracer: &'a Tracer,
     /// The scene as the tracer has it.
     pub flat: &'a FlatScene<'a>,
-    /// Distance in scene units to both sides of the surfaces in which those of a detailed model
-    /// are looked for; `None`: surfaces are their own.
-    pub cage: Option<f64>,
+    /// Where the surfaces of a detailed model are looked for; `None`: surfaces are their own.
+    pub cage: Option<Cage<'a>>,
 }
 
 /// Bakes a texture of a scene's surfaces; `control` hears how many bands of rows are done.
@@ -97,7 +100,8 @@ pub fn bake(
     settings: &BakeSettings,
     control: &mut dyn Control,
 ) -> Result<BakedMap> {
-    let corners: Vec<&[[Vec2; 3]]> = texture.surfaces.iter().map(|s| &s.corners[..]).collect();
+    let shown = texture.shown_corners();
+    let corners: Vec<&[[Vec2; 3]]> = shown.iter().map(|corners| &corners[..]).collect();
     let layout = Layout::new(texture.size, &corners);
     let count = texture.size[0] as usize * texture.size[1] as usize;
     let mut map = BakedMap { size: texture.size, ..BakedMap::default() };
@@ -144,6 +148,14 @@ pub fn bake(
         None => background(settings.map, map.values[at]),
     });
     map.values = filled.collect();
+
+    // edges whose sides lie apart
+    if let Some(lookups) = SeamLookups::find(scene, texture, settings) {
+        if settings.seams == SeamTreatment::Match {
+            lookups.equalize(&mut map.values, settings.map);
+        }
+        map.seams = lookups.measure(&map.values);
+    }
     Ok(map)
 }
 
@@ -211,6 +223,8 @@ struct Baker<'a> {
     frames: Vec<Option<SurfaceFrames<'a>>>,
     /// The meshes of a detailed model.
     detailed: Vec<Option<SurfaceFrames<'a>>>,
+    /// Where rays to it start.
+    cage: Option<CageFrames<'a>>,
     /// Rays out of the surface, and into it.
     outward: Option<PointTracer<'a>>,
     inward: Option<PointTracer<'a>>,
@@ -249,6 +263,7 @@ impl<'a> Baker<'a> {
             settings,
             frames: texture.surfaces.iter().map(|s| SurfaceFrames::new(scene, s, needs_tangents)).collect(),
             detailed: (0..meshes).map(|mesh| SurfaceFrames::of_mesh(traced.scene, mesh)).collect(),
+            cage: traced.cage.map(CageFrames::new),
             outward: if is_outward { Some(PointTracer::new(tracer, sampling(false))?) } else { None },
             inward: if is_inward { Some(PointTracer::new(tracer, sampling(true))?) } else { None },
             light: light.transpose()?,
@@ -260,8 +275,8 @@ impl<'a> Baker<'a> {
     /// Adds points to their texels; returns how many texels are inside of other geometry.
     fn add(&mut self, points: &[TexelPoint], texels: &mut [TexelSums], control: &mut dyn Control) -> Result<usize> {
         let mut sampled = self.sampled_points(points);
-        if let Some(cage) = self.traced.cage {
-            sampled = self.project(sampled, cage, control)?;
+        if self.traced.cage.is_some() {
+            sampled = self.project(sampled, control)?;
         }
         let width = self.texture.size[0];
         let place = move |sample: &Sampled| (sample.point.texel[1] * width + sample.point.texel[0]) as usize;
@@ -367,18 +382,18 @@ impl<'a> Baker<'a> {
         sampled
     }
 
-    /// Moves points onto the detailed model: along the shading normal, from outside of the cage to
-    /// its inside. Those that meet nothing are left out.
-    fn project(&self, sampled: Vec<Sampled>, cage: f64, control: &mut dyn Control) -> Result<Vec<Sampled>> {
+    /// Moves points onto the detailed model: from the cage through the point and as far behind it.
+    /// Those that meet nothing are left out.
+    fn project(&self, sampled: Vec<Sampled>, control: &mut dyn Control) -> Result<Vec<Sampled>> {
         let mut rays = Vec::with_capacity(sampled.len());
         for sample in &sampled {
-            let Some(surface) = self.surface_point(sample) else { return Ok(Vec::new()) };
-            let normal = surface.frame.z_axis;
+            let (Some(surface), Some(cage)) = (self.surface_point(sample), &self.cage) else { return Ok(Vec::new()) };
+            let (start, direction, length) = cage.ray(&surface, &sample.point, sample.instance);
             rays.push(Ray {
-                origin: (surface.world + cage * normal - self.traced.flat.origin).as_vec3().to_array(),
+                origin: (start - self.traced.flat.origin).as_vec3().to_array(),
                 tmin: 0.0,
-                direction: (-normal).as_vec3().to_array(),
-                tmax: 2.0 * cage as f32,
+                direction: direction.as_vec3().to_array(),
+                tmax: length as f32,
             });
         }
         if rays.is_empty() {

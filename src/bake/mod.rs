@@ -4,12 +4,14 @@
 //! [`plan`] decides which textures there are and where surfaces lie in them: by texture coordinates
 //! that a file has, if no two places share a texel, else by coordinates that are made for it
 //! ([`unwrap`]). [`texels`] finds the points of surfaces that each texel shows, [`trace`] samples
-//! the hemispheres over them by the renderer's tracers, [`map`] turns the sums into values, and
-//! [`fill`] extends them beyond the borders of charts. [`vertices`] does the same for vertices.
-//! [`document`] writes the results into the model's own file, of which all else stays.
+//! the hemispheres over them by the renderer's tracers, [`map`] turns the sums into values,
+//! [`fill`] extends them beyond the borders of charts, and [`seams`] compares them there.
+//! [`vertices`] does the same for vertices. [`document`] writes the results into the model's own
+//! file, of which all else stays.
 
 pub mod agreement;
 mod backfaces;
+pub mod cage;
 pub mod document;
 pub mod fill;
 mod frames;
@@ -18,10 +20,12 @@ pub mod map;
 pub mod pack;
 pub mod picture;
 pub mod plan;
+pub mod seams;
 pub mod session;
 pub mod smooth;
 pub mod texels;
 pub mod trace;
+pub mod udim;
 pub mod unwrap;
 pub mod vertices;
 
@@ -101,6 +105,16 @@ choices! {
 }
 
 choices! {
+    /// How edges are treated whose two sides lie apart in the texture.
+    pub enum SeamTreatment {
+        /// As sampled
+        Leave = "leave",
+        /// Texels along them are changed until both sides agree
+        Match = "match",
+    }
+}
+
+choices! {
     /// Where results go in a model.
     pub enum Target {
         /// Textures
@@ -171,10 +185,14 @@ pub struct BakeSettings {
     pub padding: f64,
     /// Noise is filtered in the texture, which puts a bias in its place.
     pub is_smoothed: bool,
+    /// Edges whose two sides lie apart in the texture.
+    pub seams: SeamTreatment,
     /// Coordinates of directions and positions.
     pub space: Space,
     /// Values are the mean over all instances of a mesh, not those of the first.
     pub averages_instances: bool,
+    /// Each instance of a mesh has a texture of its own.
+    pub has_unique_instances: bool,
     /// Names of the materials that are baked; none: all.
     pub materials: Vec<String>,
     /// The light of [`Map::Light`].
@@ -195,8 +213,10 @@ impl Default for BakeSettings {
             texcoords: TexcoordChoice::default(),
             padding: f64::INFINITY,
             is_smoothed: false,
+            seams: SeamTreatment::default(),
             space: Space::default(),
             averages_instances: false,
+            has_unique_instances: false,
             materials: Vec::new(),
             light: LightSettings::default(),
         }

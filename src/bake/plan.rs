@@ -1,12 +1,13 @@
 //! Which textures a model gets: one for each material, and where its surfaces lie in it.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::Vec2;
+use glam::{IVec2, Vec2};
 
 use super::texels::Layout;
 use super::unwrap::{self, UnwrappedMesh};
-use super::{BakeSettings, TexcoordChoice};
+use super::{BakeSettings, TexcoordChoice, udim};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::scene::load::SourceFile;
@@ -32,11 +33,36 @@ pub struct PlannedTexture {
     pub unwrapped: Vec<UnwrappedMesh>,
     /// The surfaces.
     pub surfaces: Vec<Surface>,
+    /// The tile of the texture's plane that it shows, where surfaces lie in several (UDIM): all
+    /// else is in another texture.
+    pub tile: Option<IVec2>,
+    /// Where each instance has a texture of its own, the number of the instance among those of a
+    /// mesh.
+    pub placement: Option<usize>,
     /// Sentences for the user.
     pub remarks: Vec<String>,
 }
 
+impl PlannedTexture {
+    /// Texture coordinates of the corners of each triangle of each surface, in the tile that it
+    /// shows; triangles of other tiles have no extent.
+    pub fn shown_corners(&self) -> Vec<Cow<'_, [[Vec2; 3]]>> {
+        let corners = self.surfaces.iter().map(|surface| &surface.corners[..]);
+        match self.tile {
+            Some(tile) => corners.map(|corners| Cow::Owned(udim::corners_in(corners, tile))).collect(),
+            None => corners.map(Cow::Borrowed).collect(),
+        }
+    }
+
+    /// Returns true if a triangle reaches out of the unit square, where the texture repeats.
+    pub fn repeats(&self) -> bool {
+        let is_within = |c: &Vec2| c.cmpge(Vec2::ZERO).all() && c.cmple(Vec2::ONE).all();
+        !self.shown_corners().iter().all(|corners| corners.as_flattened().iter().all(is_within))
+    }
+}
+
 /// A mesh in a texture.
+#[derive(Clone)]
 pub struct Surface {
     /// Index of the scene's mesh.
     pub mesh: usize,
@@ -102,7 +128,9 @@ pub fn plan(
         if settings.materials.iter().any(|wanted| !wanted.is_empty()) && !settings.materials.contains(&name) {
             continue;
         }
-        textures.push(plan_texture(scene, file, settings, &name, material, &meshes, control)?);
+        let planned = plan_material(scene, file, settings, &name, material, &meshes, control)?;
+        let own = |texture| if settings.has_unique_instances { placements(scene, texture) } else { vec![texture] };
+        textures.extend(planned.into_iter().flat_map(own));
     }
     if let Some(missing) = settings.materials.iter().find(|wanted| !textures.iter().any(|t| t.name == **wanted)) {
         return Err(Error::Usage(format!("--only-material {missing}: no surface has a material of that name")));
@@ -113,8 +141,8 @@ pub fn plan(
     Ok(textures)
 }
 
-/// Plans the texture of a material.
-fn plan_texture(
+/// Plans the texture of a material, or of each tile that it has.
+fn plan_material(
     scene: &Scene,
     file: Option<&SourceFile>,
     settings: &BakeSettings,
@@ -122,7 +150,7 @@ fn plan_texture(
     material: Option<usize>,
     meshes: &[usize],
     control: &mut dyn Control,
-) -> Result<PlannedTexture> {
+) -> Result<Vec<PlannedTexture>> {
     // a set that the file has, if its coordinates are unique
     let mut remarks = Vec::new();
     let candidates: &[u32] = match settings.texcoords {
@@ -132,19 +160,32 @@ fn plan_texture(
     };
     for &set in candidates {
         let Some(surfaces) = surfaces_by_set(scene, meshes, set) else { continue };
-        match fault(scene, settings.size, &surfaces) {
-            None => {
-                return Ok(PlannedTexture {
-                    name: name.to_owned(),
-                    material,
-                    size: settings.size,
-                    texcoord: set,
-                    unwrapped: Vec::new(),
-                    surfaces,
-                    remarks,
-                });
+        let texture = |tile, remarks| PlannedTexture {
+            name: name.to_owned(),
+            material,
+            size: settings.size,
+            texcoord: set,
+            unwrapped: Vec::new(),
+            surfaces: surfaces.clone(),
+            tile,
+            placement: None,
+            remarks,
+        };
+        let Some(fault) = fault(scene, settings.size, &surfaces) else { return Ok(vec![texture(None, remarks)]) };
+        let corners: Vec<&[[Vec2; 3]]> = surfaces.iter().map(|s| &s.corners[..]).collect();
+        let tiles = fault.is_overlap.then(|| udim::tiles(settings.size, &corners, MAX_OVERLAP)).flatten();
+        match tiles {
+            // what was remarked on other sets is said once
+            Some(tiles) if file.is_none() => {
+                let texture = |tile| texture(Some(tile), std::mem::take(&mut remarks));
+                return Ok(tiles.into_iter().map(texture).collect());
             }
-            Some(fault) => remarks.push(format!("material `{name}`: texture coordinates {set} {fault}")),
+            Some(tiles) => remarks.push(format!(
+                "material `{name}`: texture coordinates {set} lie in {} tiles (UDIM), which glTF does not have; images \
+                 have one each",
+                tiles.len()
+            )),
+            None => remarks.push(format!("material `{name}`: texture coordinates {set} {}", fault.text)),
         }
     }
     if let TexcoordChoice::Set(set) = settings.texcoords {
@@ -173,15 +214,56 @@ fn plan_texture(
         instances: instances_of(scene, mesh),
         corners: made.scene_corners.clone(),
     };
-    Ok(PlannedTexture {
+    Ok(vec![PlannedTexture {
         name: name.to_owned(),
         material,
         size: unwrapped.size,
         texcoord: unwrapped.texcoord,
         surfaces: meshes.iter().zip(&unwrapped.meshes).map(surface).collect(),
         unwrapped: unwrapped.meshes,
+        tile: None,
+        placement: None,
         remarks,
-    })
+    }])
+}
+
+/// Splits a texture into those of single instances: the first has the first instance of each mesh,
+/// the second the second of those that have one.
+fn placements(scene: &Scene, texture: PlannedTexture) -> Vec<PlannedTexture> {
+    // a primitive of a file may be several meshes of the scene, as deformed ones are
+    let is_same = |a: usize, b: usize| {
+        let (first, second) = (&scene.meshes[a], &scene.meshes[b]);
+        let count = |mesh: &Mesh| triangles_of(mesh).map(|t| t.indices.len());
+        let key = |mesh: &Mesh| mesh.source.as_ref().map(|s| (s.mesh, s.primitive));
+        a == b || (key(first).is_some() && key(first) == key(second) && count(first) == count(second))
+    };
+    let placed = |surface: &Surface| -> Vec<usize> {
+        let instances = scene.instances.iter().enumerate();
+        let own = instances.filter(|(k, i)| is_same(i.mesh, surface.mesh) && !scene.hidden.contains(k));
+        own.map(|(k, _)| k).collect()
+    };
+    let placed: Vec<Vec<usize>> = texture.surfaces.iter().map(placed).collect();
+    let most = placed.iter().map(Vec::len).max().unwrap_or_default();
+    if most < 2 {
+        return vec![texture];
+    }
+
+    let mut remarks = texture.remarks;
+    let nth = |k: usize| PlannedTexture {
+        name: texture.name.clone(),
+        unwrapped: Vec::new(),
+        surfaces: (texture.surfaces.iter().zip(&placed))
+            .filter_map(|(surface, placed)| {
+                let instance = *placed.get(k)?;
+                let mesh = scene.instances[instance].mesh;
+                Some(Surface { mesh, instances: vec![instance], corners: surface.corners.clone() })
+            })
+            .collect(),
+        placement: Some(k),
+        remarks: std::mem::take(&mut remarks),
+        ..texture
+    };
+    (0..most).map(nth).collect()
 }
 
 /// The meshes by a set of texture coordinates, which all of them must have.
@@ -202,8 +284,17 @@ fn surfaces_by_set(scene: &Scene, meshes: &[usize], set: u32) -> Option<Vec<Surf
     meshes.iter().map(surface).collect()
 }
 
-/// Why texture coordinates are not unique, in words; `None` if they are.
-fn fault(scene: &Scene, size: [u32; 2], surfaces: &[Surface]) -> Option<String> {
+/// Why texture coordinates are not unique.
+struct Fault {
+    /// The reason in words.
+    text: String,
+    /// Surfaces share texels, and nothing else is wrong.
+    is_overlap: bool,
+}
+
+/// Why texture coordinates are not unique; `None` if they are.
+fn fault(scene: &Scene, size: [u32; 2], surfaces: &[Surface]) -> Option<Fault> {
+    let other = |text| Some(Fault { text, is_overlap: false });
     // surfaces of no extent in the texture, or that repeat it
     let (mut area, mut lost, mut repeated) = (0.0, 0.0, 0.0);
     for surface in surfaces {
@@ -219,12 +310,13 @@ fn fault(scene: &Scene, size: [u32; 2], surfaces: &[Surface]) -> Option<String> 
         }
     }
     if lost > MAX_LOST * area {
-        return Some(format!("show no texels on {:.0} % of the surface", 100.0 * lost / area));
+        return other(format!("show no texels on {:.0} % of the surface", 100.0 * lost / area));
     }
     if repeated > 0.0 {
-        return Some(format!("repeat the texture on {:.0} % of the surface", 100.0 * repeated / area));
+        return other(format!("repeat the texture on {:.0} % of the surface", 100.0 * repeated / area));
     }
     let corners: Vec<&[[Vec2; 3]]> = surfaces.iter().map(|s| &s.corners[..]).collect();
     let overlap = Layout::new(size, &corners).overlap();
-    (overlap > MAX_OVERLAP).then(|| format!("overlap: {:.1} % of the texels show several places", 100.0 * overlap))
+    let text = || format!("overlap: {:.1} % of the texels show several places", 100.0 * overlap);
+    (overlap > MAX_OVERLAP).then(|| Fault { text: text(), is_overlap: true })
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::cage::Detailed;
 use super::map::{self, BakedMap, Traced};
 use super::plan::{PlannedTexture, meshes_by_material};
 use super::vertices::{self, BakedVertices};
@@ -33,9 +34,10 @@ pub struct BakeSession<'a> {
     pub tracing: &'a DeviceSettings,
     /// The settings of what is baked.
     pub settings: &'a BakeSettings,
-    /// A detailed model that is traced in place of the scene, and how far from the scene's surfaces
-    /// its own may be, in scene units.
-    pub detailed: Option<(&'a Scene, f64)>,
+    /// A detailed model that is traced in place of the scene.
+    pub detailed: Option<Detailed<'a>>,
+    /// Models that occlude besides, where their files place them.
+    pub occluding: &'a [Scene],
 }
 
 impl BakeSession<'_> {
@@ -48,7 +50,7 @@ impl BakeSession<'_> {
         let groups = planned.iter().map(|t| t.surfaces.iter().map(|s| s.mesh).collect()).collect::<Vec<Vec<usize>>>();
         let share = u64::from(self.settings.spp) << 20;
         self.with_each(&groups, share, control, |flat, tracer, nth, control| {
-            let traced = Traced { scene: flat.scene, tracer, flat, cage: self.detailed.map(|(_, cage)| cage) };
+            let traced = Traced { scene: flat.scene, tracer, flat, cage: self.detailed.map(|d| d.cage) };
             maps.push(map::bake(self.scene, traced, &planned[nth], self.settings, control)?);
             Ok(())
         })?;
@@ -121,9 +123,9 @@ impl BakeSession<'_> {
         }
     }
 
-    /// The scene that occludes: all of it, or these meshes alone, and the ground.
+    /// The scene that occludes: all of it, or these meshes alone, the ground, and other models.
     fn occluders(&self, meshes: Option<&[usize]>) -> Cow<'_, Scene> {
-        let mut scene = Cow::Borrowed(self.detailed.map_or(self.scene, |(detailed, _)| detailed));
+        let mut scene = Cow::Borrowed(self.detailed.map_or(self.scene, |d| d.scene));
         if let Some(meshes) = meshes {
             // what is hidden keeps its number
             let others = self.scene.instances.iter().enumerate().filter(|(_, i)| !meshes.contains(&i.mesh));
@@ -142,6 +144,15 @@ impl BakeSession<'_> {
                 object_to_world: glam::DAffine3::IDENTITY,
             });
             scene.meshes.push(Mesh { name: "ground".to_owned(), geometry: floor, material: 0, source: None });
+        }
+
+        // other models, whose instances come last: the others keep their numbers
+        for model in self.occluding {
+            let scene = scene.to_mut();
+            let (first, hidden) = (scene.instances.len(), model.hidden.clone());
+            let placed = scene.append(model.clone());
+            scene.instances.extend(placed);
+            scene.hidden.extend(hidden.into_iter().map(|k| first + k));
         }
         scene
     }

@@ -2,19 +2,23 @@
 //! colours of its vertices.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 
 use clap::{Args, ValueHint};
 use serde_json::json;
 
 use super::args::LoadArgs;
+use crate::bake::cage::{Cage, Detailed, check as check_cage};
 use crate::bake::document::TextureImages;
 use crate::bake::map::BakedMap;
 use crate::bake::picture::{self, Bits};
 use crate::bake::plan::{PlannedTexture, plan};
+use crate::bake::seams::Seams;
 use crate::bake::session::BakeSession;
 use crate::bake::{
-    BakeSettings, LightSettings, Map, Occluders, Space, Target, TexcoordChoice, agreement, document, pack,
+    BakeSettings, LightSettings, Map, Occluders, SeamTreatment, Space, Target, TexcoordChoice, agreement, document,
+    pack, udim,
 };
 use crate::error::{Error, Result};
 use crate::files;
@@ -24,7 +28,7 @@ use crate::integrators::ao::{Hemisphere, Occlusion};
 use crate::integrators::lighting::LightingSettings;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::export::{AmendedFile, export_gltf};
-use crate::scene::load::{LoadOptions, load_with};
+use crate::scene::load::{LoadOptions, is_scene_file, load_with};
 use crate::scene::{Scene, SceneSettings};
 use crate::settings::Length;
 use crate::settings::parse::parse_falloff;
@@ -92,17 +96,22 @@ pub struct BakeArgs {
     /// Normal of the hemisphere
     #[arg(long, value_enum, default_value = "geometric")]
     pub ao_normal: Hemisphere,
-    /// What occludes a surface
-    #[arg(long, value_enum, default_value = "scene")]
-    pub occluders: Occluders,
+    /// What occludes: the scene, the meshes of the surface's material, or also a model
+    ///
+    /// `scene` or `material` and any number of models (.gltf, .glb, .obj, .brhan) may be given. A model occludes besides, where its file places it, and is not baked.
+    #[arg(long, value_name = "scene|material|MODEL", value_parser = str::parse::<OccludersArg>)]
+    #[arg(default_value = "scene")]
+    pub occluders: Vec<OccludersArg>,
     /// Detailed model whose surfaces are baked onto this one (high to low)
     ///
     /// Maps show what lies within --cage of a texel along its normal.
     #[arg(long, value_name = "MODEL", value_hint = ValueHint::FilePath)]
     pub from: Option<String>,
-    /// Distance from the surface within which those of --from are looked for, on both sides [default: 2%]
-    #[arg(long, value_name = "D|PERCENT%", value_parser = str::parse::<Length>, requires = "from")]
-    pub cage: Option<Length>,
+    /// Distance on both sides within which --from is looked for, or a model as cage [default: 2%]
+    ///
+    /// The model is an inflated copy of this one, with the same triangles in the same order. Rays start at its surface, go through that of this one, and end as far behind.
+    #[arg(long, value_name = "D|PERCENT%|MODEL", value_parser = str::parse::<CageArg>, requires = "from")]
+    pub cage: Option<CageArg>,
     /// A ground plane under the scene occludes, too
     #[arg(long)]
     pub ground: bool,
@@ -117,12 +126,20 @@ pub struct BakeArgs {
     /// Filter noise in the texture, not across edges or charts (biased)
     #[arg(long)]
     pub denoise: bool,
+    /// Edges whose two sides lie apart in the texture
+    #[arg(long, value_enum, default_value = "leave")]
+    pub seams: SeamTreatment,
     /// Coordinates of directions and positions
     #[arg(long, value_enum, default_value = "world")]
     pub space: Space,
     /// Average over all instances of a mesh, not the first alone
     #[arg(long)]
     pub average_instances: bool,
+    /// Bake a texture for each instance of a mesh, as an image of its own
+    ///
+    /// The first image shows the first instance of each mesh, the second the second of those that have one, and so on: NAME-1.png, NAME-2.png.
+    #[arg(long, conflicts_with = "average_instances")]
+    pub unique_instances: bool,
     /// Bake this material alone; may be given several times [default: all]
     #[arg(long, value_name = "NAME")]
     pub only_material: Vec<String>,
@@ -164,6 +181,74 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 fn parse_error(text: &str) -> Result<f64, String> {
     let error = text.trim().parse().ok().filter(|e: &f64| *e > 0.0 && *e < 1.0);
     error.ok_or_else(|| "expected a number between 0 and 1".to_owned())
+}
+
+/// The value of `--occluders`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OccludersArg {
+    /// Surfaces of the scene.
+    Scene(Occluders),
+    /// A model besides.
+    Model(String),
+}
+
+impl FromStr for OccludersArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match Occluders::ALL.into_iter().find(|choice| choice.name() == text) {
+            Some(choice) => Ok(Self::Scene(choice)),
+            None if is_model(text) => Ok(Self::Model(text.to_owned())),
+            None => Err("expected scene, material or a model (.gltf, .glb, .obj, .brhan)".to_owned()),
+        }
+    }
+}
+
+/// The value of `--cage`: where a detailed model is looked for.
+#[derive(Clone, Debug)]
+pub enum CageArg {
+    /// Within this distance of the surface.
+    Distance(Length),
+    /// From the surface of this model.
+    Model(String),
+}
+
+impl FromStr for CageArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(length) => Ok(Self::Distance(length)),
+            Err(_) if is_model(text) => Ok(Self::Model(text.to_owned())),
+            Err(_) => Err("expected a length, a share such as 2%, or a model (.gltf, .glb, .obj, .brhan)".to_owned()),
+        }
+    }
+}
+
+/// Whether a text names a model, by its extension.
+fn is_model(text: &str) -> bool {
+    is_scene_file(text) || text.starts_with("builtin:")
+}
+
+impl BakeArgs {
+    /// Surfaces of the scene that occlude.
+    fn own_occluders(&self) -> Occluders {
+        let own = self.occluders.iter().find_map(|o| if let OccludersArg::Scene(own) = o { Some(*own) } else { None });
+        own.unwrap_or_default()
+    }
+
+    /// Models that occlude besides.
+    fn occluding_models(&self) -> impl Iterator<Item = &str> {
+        self.occluders.iter().filter_map(|o| if let OccludersArg::Model(path) = o { Some(path.as_str()) } else { None })
+    }
+
+    /// The model that is the cage.
+    fn cage_model(&self) -> Option<&str> {
+        match &self.cage {
+            Some(CageArg::Model(path)) => Some(path),
+            _ => None,
+        }
+    }
 }
 
 fn parse_bits(text: &str) -> Result<Bits, String> {
@@ -210,10 +295,18 @@ fn check(args: &BakeArgs) -> Result<Output> {
         ),
         (is_image && to_vertices, "--to vertices: an image has no vertices; write a model, .glb or .gltf"),
         (
-            args.from.is_some() && (to_vertices || args.occluders != Occluders::Scene),
+            args.from.is_some() && (to_vertices || args.occluders != [OccludersArg::Scene(Occluders::Scene)]),
             "--from is for textures, and what it names occludes",
         ),
-        (matches!(args.cage, Some(Length::Auto)), "--cage: a length or a share is expected"),
+        (
+            args.occluders.iter().filter(|o| matches!(o, OccludersArg::Scene(_))).count() > 1,
+            "--occluders: scene or material, not both, and any number of models",
+        ),
+        (
+            args.unique_instances && !is_image,
+            "--unique-instances is for images, since a model's instances share textures: write one, .png or .exr",
+        ),
+        (matches!(args.cage, Some(CageArg::Distance(Length::Auto))), "--cage: a length or a share is expected"),
         (
             args.target_error.is_some() && (to_vertices || !args.map.is_sampled() || is_light),
             "--target-error is for textures of what rays sample, but for light",
@@ -228,6 +321,11 @@ fn check(args: &BakeArgs) -> Result<Output> {
             "--environment, --light, --integrator and --max-depth are for --map light",
         ),
         (args.denoise && to_vertices, "--denoise is for textures: vertices are the means of their triangles"),
+        (
+            args.seams == SeamTreatment::Match
+                && (to_vertices || (args.map.is_vector() && args.space == Space::Tangent)),
+            "--seams match is for textures, and not for directions in tangent space, which turns at a seam",
+        ),
         (is_packed && (is_image || to_vertices), "--pack orm is for textures of a model"),
         (is_packed && args.bits == Bits::Sixteen, "--pack orm: packed textures have 8 bits a channel"),
         (is_image && args.verify, "--verify renders the written model: write one, .glb or .gltf"),
@@ -251,6 +349,8 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     if let Some(from) = &args.from {
         files_plan.reads("--from", from);
     }
+    args.occluding_models().for_each(|model| files_plan.reads("--occluders", model));
+    args.cage_model().iter().for_each(|cage| files_plan.reads("--cage", cage));
     files_plan.writes("the output", &args.output);
     files_plan.check()?;
     files::check_writable(&args.output)?;
@@ -284,23 +384,40 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     for line in remarks.iter().chain(planned.iter().flat_map(|t| &t.remarks)) {
         console.line(line)?;
     }
+
+    // other models: a detailed one and its cage, and what occludes besides
+    let mut load = |path: &str| {
+        let scene = args.load.load(path, &console)?;
+        files_plan.check_scene(&scene.report.files)?;
+        scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
+        Ok::<_, Error>(scene)
+    };
+    let detailed = args.from.as_deref().map(&mut load).transpose()?;
+    let occluding = args.occluding_models().map(&mut load).collect::<Result<Vec<_>>>()?;
+    let mut cage_model = args.cage_model().map(&mut load).transpose()?;
+    if let Some(cage_model) = &mut cage_model {
+        // a scene that became a glTF file is compared as such
+        let _folder = model.as_ref().is_some_and(|m| m.folder.is_some()).then(|| as_gltf(cage_model)).transpose()?;
+        check_cage(&scene, cage_model)?;
+    }
+
     // lights may be meshes, which have no textures
     lighting.apply(&mut scene)?;
     let unpacked = planned.iter().filter(|_| args.pack.is_some()).filter_map(|t| pack::partner(&scene, t).err());
     unpacked.for_each(|reason| warnings.add(&reason));
 
     // the maps, or the values of vertices
-    let detailed = args.from.as_ref().map(|from| args.load.load(from, &console)).transpose()?;
-    if let Some(detailed) = &detailed {
-        files_plan.check_scene(&detailed.report.files)?;
-        detailed.report.all_warnings().iter().for_each(|w| warnings.add(w));
-    }
+    let cage = match &cage_model {
+        Some(cage_model) => Cage::Model(cage_model),
+        None => Cage::Distance(cage_distance(args, &scene)),
+    };
     let session = BakeSession {
         scene: &scene,
         device: &device,
         tracing: &args.device,
         settings: &settings,
-        detailed: detailed.as_ref().map(|detailed| (detailed, cage(args, &scene))),
+        detailed: detailed.as_ref().map(|scene| Detailed { scene, cage }),
+        occluding: &occluding,
     };
     let mut control = ProgressControl { progress: Progress::new("baking", &console), keep_partial: false };
     let mut record = json!({
@@ -381,8 +498,8 @@ fn bake_and_write(
 /// The file that a model is written into.
 struct ModelFile {
     file: AmendedFile,
-    /// A scene of another format, as a glTF file.
-    _folder: Option<tempfile::TempDir>,
+    /// Where the file is that a scene of another format became.
+    folder: Option<tempfile::TempDir>,
 }
 
 impl ModelFile {
@@ -394,7 +511,7 @@ impl ModelFile {
         }
         let path = Path::new(&args.scene);
         if ["gltf", "glb"].iter().any(|extension| files::has_extension(path, extension)) {
-            return Ok(Some(Self { file: AmendedFile::open(path)?, _folder: None }));
+            return Ok(Some(Self { file: AmendedFile::open(path)?, folder: None }));
         }
         if !files::has_extension(&args.output, "glb") {
             let output = args.output.display();
@@ -402,17 +519,23 @@ impl ModelFile {
                 "{output}: a model that is no glTF file becomes a .glb: choose that name"
             )));
         }
-        let folder = tempfile::tempdir().map_err(|e| Error::Output {
-            path: std::env::temp_dir(),
-            message: format!("no folder can be made for the model: {e}"),
-        })?;
-        let path = folder.path().join("model.glb");
-        export_gltf(scene, &path)?;
-        let (name, report) = (scene.name.clone(), scene.report.clone());
-        *scene = load_with(&path.to_string_lossy(), &LoadOptions::default())?;
-        (scene.name, scene.report) = (name, report);
-        Ok(Some(Self { file: AmendedFile::open(&path)?, _folder: Some(folder) }))
+        let (folder, path) = as_gltf(scene)?;
+        Ok(Some(Self { file: AmendedFile::open(&path)?, folder: Some(folder) }))
     }
+}
+
+/// Writes a scene as a glTF file, which is loaded in its place; returns its folder and its path.
+fn as_gltf(scene: &mut Scene) -> Result<(tempfile::TempDir, PathBuf)> {
+    let folder = tempfile::tempdir().map_err(|e| Error::Output {
+        path: std::env::temp_dir(),
+        message: format!("no folder can be made for the model: {e}"),
+    })?;
+    let path = folder.path().join("model.glb");
+    export_gltf(scene, &path)?;
+    let (name, report) = (scene.name.clone(), scene.report.clone());
+    *scene = load_with(&path.to_string_lossy(), &LoadOptions::default())?;
+    (scene.name, scene.report) = (name, report);
+    Ok((folder, path))
 }
 
 /// The settings of baking, with a radius in scene units, sentences on what was chosen, and the
@@ -463,13 +586,15 @@ fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, V
         target_error: args.target_error,
         seed: args.seed,
         occlusion: Occlusion { radius, falloff: args.ao_falloff.unwrap_or(1.0), hemisphere: args.ao_normal },
-        occluders: args.occluders,
+        occluders: args.own_occluders(),
         has_ground: args.ground,
         texcoords: args.texcoord,
         padding: args.padding.map_or(f64::INFINITY, f64::from),
         is_smoothed: args.denoise,
+        seams: args.seams,
         space: args.space,
         averages_instances: args.average_instances,
+        has_unique_instances: args.unique_instances,
         materials: args.only_material.clone(),
         light,
     };
@@ -480,12 +605,17 @@ fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, V
 }
 
 /// The distance from surfaces within which those of a detailed model are looked for, scene units.
-fn cage(args: &BakeArgs, scene: &Scene) -> f64 {
+fn cage_distance(args: &BakeArgs, scene: &Scene) -> f64 {
     let diagonal = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
-    args.cage.and_then(|length| length.units(diagonal)).unwrap_or(0.02 * diagonal)
+    let length = match &args.cage {
+        Some(CageArg::Distance(length)) => length.units(diagonal),
+        _ => None,
+    };
+    length.unwrap_or(0.02 * diagonal)
 }
 
-/// The images that are written: one of the output's name, or with several textures one a material.
+/// The images that are written: one of the output's name, or with several textures one a material,
+/// instance and tile.
 fn image_paths(args: &BakeArgs, output: Output, planned: &[PlannedTexture]) -> Vec<PathBuf> {
     if output == Output::Model {
         return Vec::new();
@@ -495,8 +625,12 @@ fn image_paths(args: &BakeArgs, output: Output, planned: &[PlannedTexture]) -> V
     }
     let stem = args.output.file_stem().unwrap_or_default().to_string_lossy();
     let extension = args.output.extension().unwrap_or_default().to_string_lossy();
+    let has_materials = planned.iter().any(|texture| texture.name != planned[0].name);
     let path = |texture: &PlannedTexture| {
-        args.output.with_file_name(format!("{stem}-{}.{extension}", files::portable_name(&texture.name)))
+        let material = if has_materials { format!("-{}", files::portable_name(&texture.name)) } else { String::new() };
+        let placement = texture.placement.map_or_else(String::new, |k| format!("-{}", k + 1));
+        let tile = texture.tile.and_then(udim::number).map_or_else(String::new, |n| format!(".{n}"));
+        args.output.with_file_name(format!("{stem}{material}{placement}{tile}.{extension}"))
     };
     planned.iter().map(path).collect()
 }
@@ -511,7 +645,16 @@ fn describe(maps: &[BakedMap]) -> String {
     let hidden = if hidden > 0 { format!(", {hidden} texels inside of other geometry filled") } else { String::new() };
     let error = maps.iter().map(|m| m.error).fold(0.0, f64::max);
     let error = if error > 0.0 { format!(", standard error at most {error:.4}") } else { String::new() };
-    format!("{count} of {sizes}{error}{hidden}")
+    let seams = maps.iter().filter_map(|m| m.seams);
+    let worst =
+        seams.reduce(|a, b| Seams { edges: a.edges + b.edges, rmse: a.rmse.max(b.rmse), max: a.max.max(b.max) });
+    let seams = match worst {
+        Some(s) => {
+            format!(", {} edges at seams (RMSE at most {:.4}, largest difference {:.4})", s.edges, s.rmse, s.max)
+        }
+        None => String::new(),
+    };
+    format!("{count} of {sizes}{error}{seams}{hidden}")
 }
 
 /// A texture in the JSON record.
@@ -521,10 +664,15 @@ fn texture_record(texture: &PlannedTexture, map: &BakedMap) -> serde_json::Value
         "material": texture.name,
         "size": map.size,
         "texcoord": texture.texcoord,
+        "tile": texture.tile.and_then(udim::number),
+        "instances": texture.placement.map(|_| texture.surfaces.iter().flat_map(|s| &s.instances).collect::<Vec<_>>()),
         "unwrapped": !texture.unwrapped.is_empty(),
         "covered": covered as f64 / map.covered.len().max(1) as f64,
         "hidden_texels": map.hidden,
         "standard_error": map.error,
+        "seam_edges": map.seams.map_or(0, |s| s.edges),
+        "seam_rmse": map.seams.map(|s| s.rmse),
+        "seam_max": map.seams.map(|s| s.max),
         "bounds": [map.bounds.0.to_array(), map.bounds.1.to_array()],
         "rays": map.rays,
     })

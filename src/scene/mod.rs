@@ -5,6 +5,7 @@
 //! radians, colours linear with sRGB primaries, triangles counter-clockwise seen from their front.
 
 pub mod animation;
+mod append;
 pub mod blackbody;
 mod bounds;
 pub mod builtin;

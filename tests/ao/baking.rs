@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
+use skylit::bake::cage::{Cage, Detailed, check};
 use skylit::bake::map::BakedMap;
 use skylit::bake::plan::{PlannedTexture, plan};
 use skylit::bake::session::BakeSession;
 use skylit::bake::texels::{Layout, TexelPoint};
-use skylit::bake::{BakeSettings, LightSettings, Map, Occluders, Space};
+use skylit::bake::{BakeSettings, LightSettings, Map, Occluders, SeamTreatment, Space};
 use skylit::film::NoControl;
 use skylit::gpu::Device;
 use skylit::integrators::ao::Occlusion;
@@ -51,12 +52,25 @@ fn tracing(kind: TracerKind) -> DeviceSettings {
 
 /// The map of the first material.
 fn bake(device: &Arc<Device>, kind: TracerKind, scene: &Scene, settings: BakeSettings) -> (PlannedTexture, BakedMap) {
+    let mut all = bake_all(device, kind, scene, &[], settings);
+    assert_eq!(all.len(), 1);
+    all.remove(0)
+}
+
+/// The maps of the first material, where other models occlude besides.
+fn bake_all(
+    device: &Arc<Device>,
+    kind: TracerKind,
+    scene: &Scene,
+    occluding: &[Scene],
+    settings: BakeSettings,
+) -> Vec<(PlannedTexture, BakedMap)> {
     let settings = BakeSettings { materials: vec!["0".to_owned()], ..settings };
-    let mut planned = plan(scene, None, &settings, &mut NoControl).unwrap();
-    let session = BakeSession { scene, device, tracing: &tracing(kind), settings: &settings, detailed: None };
-    let mut maps = session.bake_textures(&planned, &mut NoControl).unwrap();
-    assert_eq!(maps.len(), 1);
-    (planned.remove(0), maps.remove(0))
+    let planned = plan(scene, None, &settings, &mut NoControl).unwrap();
+    let session =
+        BakeSession { scene, device, tracing: &tracing(kind), settings: &settings, detailed: None, occluding };
+    let maps = session.bake_textures(&planned, &mut NoControl).unwrap();
+    planned.into_iter().zip(maps).collect()
 }
 
 fn settings(size: u32, spp: u32) -> BakeSettings {
@@ -273,6 +287,100 @@ fn gpu_bake_instances() {
     }
 }
 
+/// The same, with a texture for each.
+#[test]
+fn gpu_bake_unique_instances() {
+    let device = device();
+    let floor = rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    let lid = rectangle(Vec3::new(0.0, 0.01, 0.0), Vec3::X * 9.0, Vec3::Z * 9.0);
+    let mut scene = scene_of(vec![Geometry::Triangles(floor), Geometry::Triangles(lid)]);
+    let far = DAffine3::from_translation(DVec3::X * 100.0);
+    scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: far });
+    for kind in picked(&device) {
+        let settings = BakeSettings { has_unique_instances: true, ..settings(4, 256) };
+        let baked = bake_all(&device, kind, &scene, &[], settings);
+        let found: Vec<_> =
+            baked.iter().map(|(t, m)| (t.placement, t.surfaces[0].instances[0], m.values[5].x)).collect();
+        let [(Some(0), 0, dark), (Some(1), 2, open)] = found[..] else { panic!("{kind}: {found:?}") };
+        assert!(dark < 0.01 && open > 0.99, "{kind}: {dark} {open}");
+    }
+}
+
+/// Surfaces in two tiles at the same place: each tile has an image of its own surface.
+#[test]
+fn gpu_bake_tiles() {
+    let device = device();
+    let mut floors = rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    let far = rectangle(Vec3::X * 100.0, Vec3::X, Vec3::NEG_Z);
+    floors.positions.extend(far.positions);
+    floors.indices.extend(far.indices.iter().map(|t| t.map(|v| v + 4)));
+    floors.texcoords[0].extend(far.texcoords[0].iter().map(|c| *c + Vec2::new(1.0, -1.0)));
+    let lid = rectangle(Vec3::new(100.0, 0.01, 0.0), Vec3::X * 9.0, Vec3::Z * 9.0);
+    let scene = scene_of(vec![Geometry::Triangles(floors), Geometry::Triangles(lid)]);
+    for kind in picked(&device) {
+        let baked = bake_all(&device, kind, &scene, &[], settings(8, 64));
+        let tiles: Vec<_> = baked.iter().map(|(t, _)| t.tile.unwrap().to_array()).collect();
+        assert_eq!(tiles, [[0, 0], [1, -1]], "{kind}");
+        for ((_, map), is_open) in baked.iter().zip([true, false]) {
+            assert!(map.covered.iter().all(|c| *c), "{kind}");
+            assert!(map.values.iter().all(|v| if is_open { v.x > 0.99 } else { v.x < 0.01 }), "{kind}: {is_open}");
+        }
+    }
+}
+
+/// A model that is not baked occludes, wherever the scene's own occluders are looked for.
+#[test]
+fn gpu_bake_another_model_occludes() {
+    let device = device();
+    let floor = rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    let scene = scene_of(vec![Geometry::Triangles(floor)]);
+    let lid = |x: f32| Geometry::Triangles(rectangle(Vec3::new(x, 0.01, 0.0), Vec3::X * 9.0, Vec3::Z * 9.0));
+    let (above, beside) = (scene_of(vec![lid(0.0)]), scene_of(vec![lid(100.0)]));
+    let mut hidden = above.clone();
+    hidden.hidden.insert(0);
+    for kind in picked(&device) {
+        for occluders in [Occluders::Scene, Occluders::Material] {
+            let value = |models: &[Scene]| {
+                let settings = BakeSettings { occluders, ..settings(4, 64) };
+                bake_all(&device, kind, &scene, models, settings)[0].1.values[5].x
+            };
+            assert!(value(&[]) > 0.99 && value(&[beside.clone(), hidden.clone()]) > 0.99, "{kind}");
+            assert!(value(&[beside.clone(), above.clone()]) < 0.01, "{kind}");
+        }
+    }
+}
+
+/// A floor below a sphere in two charts of other sizes and directions: both sides of the seam differ by less than the noise that a texel has.
+#[test]
+fn gpu_bake_a_seam() {
+    let device = device();
+    let corners = [[-3, 3], [0, 3], [0, -3], [-3, -3], [0, 3], [3, 3], [3, -3], [0, -3]];
+    let texcoords =
+        [[0.03, 0.03], [0.45, 0.03], [0.45, 0.97], [0.03, 0.97], [0.55, 0.9], [0.55, 0.1], [0.97, 0.1], [0.97, 0.9]];
+    let floor = TriangleMesh {
+        positions: corners.iter().map(|[x, z]| Vec3::new(*x as f32, 0.0, *z as f32)).collect(),
+        indices: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+        texcoords: [texcoords.map(Vec2::from).to_vec(), Vec::new()],
+        ..TriangleMesh::default()
+    };
+    let sphere = Sphere { center: Vec3::new(0.0, 1.25, 0.0), radius: 1.0 };
+    let scene = scene_of(vec![Geometry::Triangles(floor), Geometry::Spheres(vec![sphere])]);
+    for kind in picked(&device) {
+        let seams = |seams, spp| {
+            let (_, map) = bake(&device, kind, &scene, BakeSettings { seams, ..settings(64, spp) });
+            (map.seams.unwrap(), map.error)
+        };
+        let (left, noise) = seams(SeamTreatment::Leave, 256);
+        let (noisy, _) = seams(SeamTreatment::Leave, 4);
+        let (matched, _) = seams(SeamTreatment::Match, 256);
+        println!("{kind}: {left:?}, noise {noise:.4}, 4 samples {noisy:?}, matched {matched:?}");
+        assert_eq!(left.edges, 1, "{kind}");
+        assert!(left.rmse > 0.0 && left.rmse < noise && left.max < 4.0 * noise, "{kind}: {left:?} {noise}");
+        assert!(noisy.rmse > 3.0 * left.rmse, "{kind}: {noisy:?}");
+        assert!(matched.rmse < 0.1 * left.rmse, "{kind}: {matched:?}");
+    }
+}
+
 #[test]
 fn positions_and_normals_are_those_of_the_surface() {
     let device = device();
@@ -336,7 +444,8 @@ fn gpu_bake_from_a_detailed_model() {
                 device: &device,
                 tracing: &tracing(kind),
                 settings: &settings,
-                detailed: Some((&detailed, 0.6)),
+                detailed: Some(Detailed { scene: &detailed, cage: Cage::Distance(0.6) }),
+                occluding: &[],
             };
             let map = session.bake_textures(&planned, &mut NoControl).unwrap().remove(0);
             for (at, (value, covered)) in map.values.iter().zip(&map.covered).enumerate() {
@@ -354,5 +463,51 @@ fn gpu_bake_from_a_detailed_model() {
                 assert!((*value - expected).length() < 0.02, "{kind}: {value} {expected}");
             }
         }
+    }
+}
+
+/// Rays start at the cage: a slanted one finds what lies in its direction.
+#[test]
+fn gpu_bake_from_a_cage() {
+    let device = device();
+    let card = scene_of(vec![Geometry::Triangles(rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z))]);
+    let cage = scene_of(vec![Geometry::Triangles(rectangle(Vec3::new(0.5, 0.6, 0.0), Vec3::X, Vec3::NEG_Z))]);
+    let below = Vec3::new(0.0, -0.3, 0.0);
+    let detailed = scene_of(vec![Geometry::Triangles(rectangle(below, Vec3::X * 9.0, Vec3::NEG_Z * 9.0))]);
+    check(&card, &cage).unwrap();
+    for kind in picked(&device) {
+        let settings = BakeSettings { map: Map::Position, ..settings(16, 4) };
+        let session = BakeSession {
+            scene: &card,
+            device: &device,
+            tracing: &tracing(kind),
+            settings: &settings,
+            detailed: Some(Detailed { scene: &detailed, cage: Cage::Model(&cage) }),
+            occluding: &[],
+        };
+        let planned = plan(&card, None, &settings, &mut NoControl).unwrap();
+        let map = session.bake_textures(&planned, &mut NoControl).unwrap().remove(0);
+        assert!(map.covered.iter().all(|c| *c), "{kind}");
+        for (at, value) in map.values.iter().enumerate() {
+            let [x, z] = [at % 16, at / 16].map(|k| (k as f32 + 0.5) / 8.0 - 1.0);
+            // half of the way from the cage to the card lies behind it
+            assert!((*value - Vec3::new(x - 0.25, -0.3, -z)).length() < 1e-3, "{kind}: {value} at {x} {z}");
+        }
+    }
+}
+
+#[test]
+fn a_cage_of_other_triangles_is_refused() {
+    let card = || rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    let scene = scene_of(vec![Geometry::Triangles(card())]);
+    let refused = |cage: &Scene| check(&scene, cage).unwrap_err().to_string();
+    let turned = TriangleMesh { indices: vec![[0, 1, 3], [1, 2, 3]], ..card() };
+    let fewer = TriangleMesh { indices: vec![[0, 1, 2]], ..card() };
+    let sphere = Geometry::Spheres(vec![Sphere { center: Vec3::ZERO, radius: 1.0 }]);
+    let several = || vec![Geometry::Triangles(card()), Geometry::Triangles(card())];
+    let texts = [vec![Geometry::Triangles(turned)], vec![Geometry::Triangles(fewer)], vec![sphere], several()]
+        .map(|meshes| refused(&scene_of(meshes)));
+    for (text, what) in texts.iter().zip(["join other vertices", "has 1 triangles", "spheres", "has 2 instances"]) {
+        assert!(text.contains(what) && text.contains("a copy of the model"), "{text}");
     }
 }

@@ -214,6 +214,101 @@ fn other_formats_become_gltf_and_images_have_a_file_each() {
     assert_eq!(image::open(&map).unwrap().color(), image::ColorType::Rgb16);
 }
 
+/// Squares of an OBJ file, 3 apart, each in the tile of its number.
+fn squares(folder: &Path, name: &str, y: f32, tiles: &[[i32; 2]]) -> String {
+    let mut text = String::new();
+    for (k, [u, v]) in tiles.iter().enumerate() {
+        for [x, z] in [[0, 1], [1, 1], [1, 0], [0, 0]] {
+            let at = 3 * k as i32 + x;
+            text += &format!("v {at} {y} {z}\nvt {}.0 {}.0\n", u + x, v + 1 - z);
+        }
+        let [a, b, c, d] = [1, 2, 3, 4].map(|n| 4 * k + n);
+        text += &format!("f {a}/{a} {b}/{b} {c}/{c} {d}/{d}\n");
+    }
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn tiles_have_an_image_each_and_models_new_coordinates() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = squares(dir.path(), "tiles.obj", 0.0, &[[0, 0], [1, 0], [0, 1]]);
+    let png = place(&dir, "map.png");
+    let record = bakes(&[&model, "-o", &png, "--size", "16", "--spp", "4"]);
+    let textures = record["textures"].as_array().unwrap();
+    let tiles: Vec<u64> = textures.iter().map(|t| t["tile"].as_u64().unwrap()).collect();
+    assert_eq!(tiles, [1011, 1001, 1002]);
+    assert!(tiles.iter().all(|tile| Path::new(&place(&dir, &format!("map.{tile}.png"))).is_file()));
+    assert!(textures.iter().all(|t| t["covered"] == 1.0 && t["seam_edges"] == 0 && t["seam_rmse"].is_null()));
+
+    // glTF has no tiles
+    let glb = place(&dir, "tiles.glb");
+    let out = run(&["bake", &model, "-o", &glb, "--size", "64", "--spp", "4"]);
+    let said = String::from_utf8(out.stdout.clone()).unwrap() + &stderr(&out);
+    assert!(out.status.success() && said.contains("lie in 3 tiles (UDIM), which glTF does not have"), "{said}");
+}
+
+#[test]
+fn other_models_occlude_and_are_cages() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = squares(dir.path(), "floor.obj", 0.0, &[[0, 0]]);
+    let above = squares(dir.path(), "above.obj", 0.01, &[[0, 0]]);
+    // a lid looks down: its back would have the floor within it
+    let text = fs::read_to_string(&above).unwrap().replace("f 1/1 2/2 3/3 4/4", "f 4/4 3/3 2/2 1/1");
+    let lid = place(&dir, "lid.obj");
+    fs::write(&lid, text).unwrap();
+    let exr = place(&dir, "map.exr");
+    let mean = |args: &[&str]| {
+        bakes(&[&[&model, "-o", &exr, "--size", "16", "--spp", "64", "--ao-radius", "5"], args].concat());
+        let image = output::load(Path::new(&exr)).unwrap();
+        let plane = image.f32("Y").unwrap();
+        plane.iter().sum::<f32>() / plane.len() as f32
+    };
+    assert_eq!(mean(&[]), 1.0);
+    assert!(mean(&["--occluders", &lid]) < 0.1);
+    assert!(mean(&["--occluders", "material", "--occluders", &lid]) < 0.1);
+
+    // a cage above finds a floor below that is too far for the distance
+    let below = squares(dir.path(), "below.obj", -0.005, &[[0, 0]]);
+    let normals = |cage: &str| {
+        let record = bakes(&[&model, "-o", &exr, "--from", &below, "--cage", cage, "--map", "normal", "--size", "16"]);
+        record["textures"][0]["covered"].as_f64().unwrap()
+    };
+    assert_eq!([normals("0.001"), normals(&above)], [0.0, 1.0]);
+    let other = squares(dir.path(), "other.obj", 0.01, &[[0, 0], [0, 0]]);
+    let args = ["bake", &model, "-o", &exr, "--from", &below, "--map", "normal", "--cage", &other];
+    fails(
+        &run(&args),
+        64,
+        &["--cage ", "other.obj: mesh", "has 4 triangles, and that of the model has 2", "moved outwards"],
+    );
+}
+
+#[test]
+fn instances_have_an_image_each() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [glb, exr] = ["stairs.glb", "stairs.exr"].map(|name| place(&dir, name));
+    bakes(&["builtin:stairs", "-o", &glb, "--size", "64", "--spp", "4"]);
+    let record = bakes(&[&glb, "-o", &exr, "--size", "16", "--spp", "4", "--unique-instances"]);
+    let textures = record["textures"].as_array().unwrap();
+    let instances: Vec<u64> =
+        textures.iter().filter_map(|t| t["instances"].as_array()).flatten().map(|i| i.as_u64().unwrap()).collect();
+    let unique: std::collections::BTreeSet<_> = instances.iter().collect();
+    assert!(instances.len() > 2 && unique.len() == instances.len(), "{record}");
+    assert!(record["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file()));
+    refuses(&["bake", &glb, "-o", &glb, "--unique-instances"], 64, "--unique-instances is for images");
+}
+
 #[test]
 fn what_cannot_be_baked_is_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -227,6 +322,11 @@ fn what_cannot_be_baked_is_refused() {
     refuses(&["bake", &model, "-o", &glb, "--texcoord", "x"], 64, "auto, unwrap or the number of a set");
     refuses(&["bake", &model, "-o", &glb, "--to", "vertices", "--spp", "2000"], 64, "at most 1024 samples");
     refuses(&["bake", "none.glb", "-o", &glb], 3, "none.glb");
+    refuses(&["bake", &model, "-o", &png, "--occluders", "all"], 64, "scene, material or a model");
+    refuses(&["bake", &model, "-o", &png, "--occluders", "scene", "--occluders", "material"], 64, "not both");
+    refuses(&["bake", &model, "-o", &png, "--from", &model, "--cage", "wide"], 64, "or a model");
+    let tangent = ["bake", &model, "-o", &png, "--map", "normal", "--space", "tangent", "--seams", "match"];
+    refuses(&tangent, 64, "turns at a seam");
     if !device() {
         return;
     }

@@ -165,7 +165,7 @@ impl Loader<'_> {
                 (model.materials, model.textures) = (vec![material], Vec::new());
             }
             self.scene.report.files.push(key.0.clone());
-            let placed = append(&mut self.scene, model);
+            let placed = self.scene.append(model);
             self.models.insert(key.clone(), placed);
         }
         for placed in &self.models[&key] {
@@ -174,24 +174,6 @@ impl Loader<'_> {
         }
         Ok(())
     }
-}
-
-/// Moves a model's meshes, materials and textures into `scene`; returns its instances, which are
-/// not placed yet.
-fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
-    let (meshes, materials, textures) = (scene.meshes.len(), scene.materials.len(), scene.textures.len());
-    scene.textures.extend(model.textures);
-    scene.materials.extend(model.materials.into_iter().map(|mut material| {
-        for slot in material.texture_slots_mut().into_iter().flatten() {
-            slot.texture += textures;
-        }
-        material
-    }));
-    scene.meshes.extend(model.meshes.into_iter().map(|mesh| Mesh { material: mesh.material + materials, ..mesh }));
-    scene.report.warnings.extend(model.report.warnings);
-    scene.report.skipped_images += model.report.skipped_images;
-    scene.report.files.extend(model.report.files);
-    model.instances.into_iter().map(|i| Instance { mesh: i.mesh + meshes, ..i }).collect()
 }
 
 /// A sphere, and the point that its centre is relative to: the centre itself where single precision
