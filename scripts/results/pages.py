@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import statistics
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,10 @@ TITLES = {
     "gpu": "On a GPU",
 }
 ABOUT = {
-    "index": """What the benchmarks and checks found at their last run. Each page has its machine, date and command at
-        the top. `python3 scripts/results.py` writes it from a record in [data](data). What was found before is in the
-        [notebook](../notebook/README.md). [Benchmarks](../reference/benchmarks.md) says what is measured, and how to
-        measure yourself.""",
+    "index": """What the benchmarks and checks found at their last run, with a main figure of each page. Each page has
+        its machine, date and command at the top. `python3 scripts/results.py` writes it from a record in [data](data).
+        What was found before is in the [notebook](../notebook/README.md).
+        [Benchmarks](../reference/benchmarks.md) says what is measured, and how to measure yourself.""",
     "rays": """Millions of rays a second by the time on the device, medians of repeats, of each kernel of the compute
         tracer and of each peer that was there. [Benchmarks](../reference/benchmarks.md) says what each stream of rays
         is.""",
@@ -243,15 +244,104 @@ def gpu_line() -> str:
     """The line of the index about the page that scripts/gpu.sh writes."""
     text = (PAGES / "gpu.md").read_text() if (PAGES / "gpu.md").is_file() else ""
     found = {k: m[1] for k in ("device", "date") if (m := re.search(rf"^\| {k} \| (.*) \|$", text, re.M))}
-    return f"| [{TITLES['gpu']}](gpu.md) | {found.get('date', '')} | {found.get('device', '')} | |"
+    steps = m[1] if (m := re.search(r"^(\d+ of \d+ steps) passed\.$", text, re.M)) else ""
+    rays = "[rays a second](gpu.md#rays-a-second)" if "## Rays a second" in text else ""
+    figure = "; ".join(x for x in (f"{steps} of tests and benchmarks pass" if steps else "", rays) if x)
+    return f"| [{TITLES['gpu']}](gpu.md) | {figure} | {found.get('date', '')} | {found.get('device', '')} | |"
+
+
+def extent(values: list[float]) -> str:
+    """The least and the greatest of figures."""
+    ends = [number(x) for x in (min(values), max(values))]
+    return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
+
+
+def leading(cell: str) -> float:
+    """The number that a cell begins with; ~ before it says that it is known less well."""
+    return float(re.match(r"~?(\d*\.?\d+)", cell)[1])  # type: ignore[index]
+
+
+def earlier_ratios(page: str, table: Record) -> list[float]:
+    """What the main figure of a page is taken from, of an earlier page's first table."""
+    head, rows = table["head"], table["rows"]
+    if page == "rays":
+        return [float(re.search(r"\((\S+) /", cell)[1]) for cell in rows[0][1:]]  # type: ignore[index]
+    if page == "frames":
+        return [leading(r[head.index("still, ratio after 1, 2, 4")]) for r in rows if r[1] == "`balanced`"]
+    if page == "ao":
+        ours, his = (head.index(f"error, `{preset}`") for preset in ("balanced", "larsen"))
+        return [leading(r[ours]) / leading(r[his]) for r in rows]
+    return [leading(r[head.index("times as long as multijitter")]) for r in rows]
+
+
+def measured(record: Record, part: str, contestant: str, quantity: str) -> list[float]:
+    """A quantity of a contestant in all scenes that have it."""
+    found = (value(find(record, s, part), contestant, quantity) for s in measured_scenes(record))
+    return [x for x in found if isinstance(x, (int, float))]
+
+
+def record_figure(page: str, record: Record) -> str:
+    """The main figure of a page whose record was kept."""
+    if page == "rays":
+        rates = measured(record, "primary", "packet", "rate") or measured(record, "primary", "wide", "rate")
+        return f"primary rays: {extent(rates)} Mrays/s" if rates else ""
+    if page == "frames":
+        ratios = measured(record, "still", "balanced", "over plain")
+        return f"`balanced`, still camera: {extent(ratios)} of the error of plain accumulation" if ratios else ""
+    if page == "ao":
+        errors = measured(record, "still", "balanced", "corrected RMSE")
+        return f"`balanced`, still camera: RMSE {extent(errors)}" if errors else ""
+    if page == "path":
+        errors = measured(record, "images", "mis", "its RMSE")
+        return f"`mis`: RMSE {extent(errors)} at the most samples" if errors else ""
+    scenes = [s for s in measured_scenes(record) if not s.startswith("Falcone")]
+    costs = [
+        {m["contestant"]: middle(m) for m in find(record, s, "camera") if m["quantity"] == "cost"} for s in scenes
+    ]
+    ratios = [c["default"] / min(c.values()) for c in costs if "default" in c]
+    return f"camera rays: `default` costs {extent(ratios)} times the least" if ratios else ""
+
+
+def merged_figure(page: str, records: list[Record]) -> str:
+    """The main figure of a page of several records."""
+    if page == "stress":
+        verdicts = [c["verdict"] for r in records for c in r["checks"]]
+        held, failed = verdicts.count("holds"), verdicts.count("fails")
+        return f"{held:,} figures with a bound hold, {failed or 'none'} {'fail' if failed > 1 else 'fails'}"
+    if page == "mitsuba":
+        scenes = distinct(row[0] for r in records for row in r["rows"])
+        passed = all(r["passed"] for r in records)
+        return f"{len(scenes)} scenes, {'all pass' if passed else 'not all pass'}"
+    fits = [f["rows"] for r in records for f in r["path"] if f["environment_light"] == "ambient"]
+    best = [row["explained"] for rows in fits for row in rows if row["name"] == "AO with the best falloff"]
+    flat = [row["explained"] for rows in fits for row in rows if row["name"] == "ambient light without occlusion"]
+    ours, none = (f"{100 * statistics.median(x):.1f} %" for x in (best, flat))
+    said = f"in place of environment and bounces, AO with the best falloff explains {ours}, ambient light alone {none}"
+    return f"{said} (medians of scenes)"
+
+
+EARLIER = {
+    "rays": "primary rays: {} times Embree's rate, one ray at a time (robust)",
+    "frames": "`balanced`, first frame of a still camera: {} of the error of plain accumulation",
+    "ao": "`balanced`, still camera: {} of the error of `larsen`",
+    "path": "`mis`: {} times as long as Mitsuba to the same error",
+}
+
+
+def main_figure(page: str, data: Record) -> str:
+    if "tables" in data:
+        return EARLIER[page].format(extent(earlier_ratios(page, data["tables"][0]))) if page in EARLIER else ""
+    return merged_figure(page, data["records"]) if page in MERGED else record_figure(page, data["record"])
 
 
 def index(records: dict[str, Record]) -> list[str]:
     rows = []
     for page, data in records.items():
         machine, note = data["machine"], data.get("note") or ("measured with `--quick`" if data.get("quick") else "")
-        rows.append([f"[{TITLES[page]}]({page}.md)", data["date"], f"{machine['cpu']}, {machine['driver']}", note])
-    lines = ["# Results", "", *wrapped(ABOUT["index"]), "", *table(["page", "date", "machine", "note"], rows)]
+        where = f"{machine['cpu']}, {machine['driver']}"
+        rows.append([f"[{TITLES[page]}]({page}.md)", main_figure(page, data), data["date"], where, note])
+    head = ["page", "main figure", "date", "machine", "note"]
+    lines = ["# Results", "", *wrapped(ABOUT["index"]), "", *table(head, rows)]
     return [*lines[:-1], gpu_line(), ""]
 
 
