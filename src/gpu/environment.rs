@@ -2,9 +2,9 @@
 //!
 //! Mesa's lavapipe uses vectors of 256 bits unless `LP_NATIVE_VECTOR_WIDTH` sets another width.
 //! With 512, where the CPU supports it, the compute tracer is a quarter to two fifths faster
-//! (docs/design/tracers.md). So the first device that a process opens, in skylit itself, in a test or in
-//! another program that uses this crate, sets the CPU's widest vectors, unless the user has set a
-//! width.
+//! (docs/design/tracers.md). So the first device that a process opens, in skylit itself, in a test
+//! or in another program that uses this crate, sets the CPU's widest vectors, unless the user has
+//! set a width.
 //!
 //! Mesa's shader cache does not distinguish widths, and code for one width gives wrong results with
 //! another. So a width other than the driver's default has its own cache folder, and the file names

@@ -293,8 +293,8 @@ choices! {
 
 impl Preset {
     /// Whether a renderer's frames are antialiased by default, which lowers their error
-    /// (docs/design/real-time.md). [`Preset::settings`] samples pixel centres, to measure the pipeline
-    /// alone.
+    /// (docs/design/real-time.md). [`Preset::settings`] samples pixel centres, to measure the
+    /// pipeline alone.
     pub fn antialiases(self) -> bool {
         matches!(self, Self::Fast | Self::Balanced | Self::Quality)
     }

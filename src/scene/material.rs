@@ -317,8 +317,8 @@ pub struct Material {
     /// KHR_materials_dispersion: 20 over the Abbe number of a volume; 0 without dispersion.
     pub dispersion: f32,
     /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF
-    /// material, unknown statements of an MTL file, `sigma[]` of `.brhan`. docs/reference/materials.md lists
-    /// those that are used.
+    /// material, unknown statements of an MTL file, `sigma[]` of `.brhan`.
+    /// docs/reference/materials.md lists those that are used.
     pub parameters: BTreeMap<String, f32>,
 }
 

@@ -1,4 +1,5 @@
-//! Messages to a peer that renders paths: a scene in files, images back (docs/reference/benchmarks.md).
+//! Messages to a peer that renders paths: a scene in files, images back
+//! (docs/reference/benchmarks.md).
 
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::Error;

@@ -1,4 +1,5 @@
-//! The peers file, which describes other renderers, and building them (docs/reference/benchmarks.md).
+//! The peers file, which describes other renderers, and building them
+//! (docs/reference/benchmarks.md).
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
