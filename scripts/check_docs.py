@@ -6,7 +6,7 @@
     python3 scripts/check_docs.py PAGE...    # these pages only, with their longest sentences
 
 Rules by the kind of a page (KINDS): length of sentences, figures, pictures, phrases that belong into the notebook. Everywhere: links lead somewhere, pages of docs/
-are in docs/SUMMARY.md, and pictures of docs/images are shown by a page. Python's own library is enough."""
+are in docs/SUMMARY.md, pictures of docs/images are shown by a page, and pages that code and messages name are there. Python's own library is enough."""
 import re
 import sys
 from dataclasses import dataclass, field
@@ -222,6 +222,18 @@ def stray(pages):
             yield f"{picture.relative_to(ROOT)}: no page shows it"
 
 
+def missing_pages():
+    """Pages that code, scripts and messages name and that are not there."""
+    folders = [ROOT / name for name in ("src", "shaders", "tests", "benches", "examples", "fuzz", "scripts", ".github")]
+    files = [f for folder in folders for f in folder.rglob("*") if f.suffix in (".rs", ".glsl", ".py", ".sh", ".toml", ".yml", ".cpp", ".js")]
+    for file in files + [ROOT / "Dockerfile", ROOT / "justfile", ROOT / "Cargo.toml", ROOT / "build.rs"]:
+        if file == Path(__file__).resolve() or not file.exists():
+            continue
+        for name in re.findall(r"\bdocs/(?:(?:guide|reference|design|results|notebook)/)?(?:commands/)?[a-z0-9-]+\.md\b", file.read_text(errors="replace")):
+            if not (ROOT / name).exists():
+                yield f"{file.relative_to(ROOT)}: names {name}, which is not there"
+
+
 def main():
     arguments = [a for a in sys.argv[1:] if not a.startswith("--")]
     top = [ROOT / f"{name}.md" for name in ("README", "ARCHITECTURE", "CONTRIBUTING", "SECURITY", "CHANGELOG")]
@@ -239,6 +251,7 @@ def main():
     found = [f"{page.name}: {problem}" for page in pages for problem in problems(page)]
     if not arguments:
         found += stray(pages)
+        found += missing_pages()
     print("\n".join(found))
     print(f"docs: {len(pages)} pages, {len(found)} breaches of the rules")
     return 1 if found else 0
