@@ -86,6 +86,12 @@ pub struct BvhArgs {
     /// `scene` takes those of the scene's lights and cameras, `rays` that of the recorded rays.
     #[arg(long, value_name = "FILE.json|scene|rays", value_hint = ValueHint::FilePath)]
     pub areas: Option<String>,
+    /// Also say of each light whether a tree of its own would pay
+    ///
+    /// Trees of each light are built twice over all primitives, which takes a while. It is for the
+    /// rays of an image, which --rays, --direction and --eye replace.
+    #[arg(long, conflicts_with_all = ["rays", "direction", "eye"])]
+    pub light_trees: bool,
     /// Bins between which split planes lie, for the rules of the laboratory
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(2..=Heuristic::MAX_BINS as i64), hide_short_help = true)]
     pub bins: u32,
@@ -228,8 +234,7 @@ pub fn run(args: &BvhArgs) -> Result<(), Failure> {
     }
 
     // whether local trees would pay: for the lights of an image
-    let is_of_image = recorded.is_none() && args.direction.is_none() && args.eye.is_none();
-    let lights = if is_of_image {
+    let lights = if args.light_trees {
         budgets(args, &flat, &hierarchy, &builder, &bounds).unwrap_or_else(|e| {
             warnings.add(&format!("no light is asked whether a local tree would pay: {e}"));
             Vec::new()
@@ -237,7 +242,7 @@ pub fn run(args: &BvhArgs) -> Result<(), Failure> {
     } else {
         Vec::new()
     };
-    if is_of_image && scene.lights.len() > MAX_LIGHTS {
+    if args.light_trees && scene.lights.len() > MAX_LIGHTS {
         warnings.add(&format!("of {} lights the first {MAX_LIGHTS} are asked whether a tree pays", scene.lights.len()));
     }
 

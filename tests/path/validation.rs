@@ -7,7 +7,9 @@ use glam::{Affine2, Vec2, Vec4};
 use skylit::accel::features::SceneFeatures;
 use skylit::integrators::ao::{Hemisphere, Occlusion};
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
+use skylit::integrators::path::points::PointLight;
 use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
+use skylit::interface::records::bake::BakePoint;
 use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
@@ -169,6 +171,16 @@ fn gpu_kernels_of_all_features_are_valid() {
                 }
                 assert_validation_clean(&device);
                 seen.3.push(&PathFeature::Signal);
+
+                // and light maps the same from points of surfaces on
+                let options = PathOptions { ambient: None, lens: None, min_depth: 0, ..options.clone() };
+                let is_mesh = |i: &Instance| matches!(scene.meshes[i.mesh].geometry, Geometry::Triangles(_));
+                let instance = scene.instances.iter().position(is_mesh).unwrap() as u32;
+                let point = BakePoint { instance, u: 0.25, v: 0.25, ..bytemuck::Zeroable::zeroed() };
+                let mut light = PointLight::new(&tracer, &flat, &options, 1, 1).unwrap();
+                light.estimate(&[point], 1, 0, &mut NoControl).unwrap();
+                assert_validation_clean(&device);
+                seen.3.push(&PathFeature::SurfacePoints);
             }
             seen.4.extend(Kind::ALL.iter().filter(|&&f| result.light_kinds.contains(f)));
         }
