@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints the tables of docs/design/tracers.md: orders of traversal, triangle tests, leaks. About five minutes on two cores.
+# Prints the tables of docs/notebook/2026-11-22-which-child-first.md: orders of traversal, triangle tests, leaks. About five minutes on two cores.
 #
 #   ./scripts/traversal_study.sh [-o orders|tests|leaks] [-- WRAPPER...]
 #

@@ -3,7 +3,7 @@
 //!     cargo run --release --example false_alarms -- tests/frames ao-cornell-box,path-cornell-box [RUNS] [SIZE] [SPP]
 //!
 //! Two rates for each frame: against its golden image in the folder, where that is for the size and the samples asked for, and against golden images that are
-//! made of the renders themselves, 32 at random for each render. docs/guide/ci.md has the result of 1,000 runs.
+//! made of the renders themselves, 32 at random for each render. docs/notebook/2026-11-23-false-alarms.md has the result of 1,000 runs.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The study of traversal orders and triangle tests that docs/design/tracers.md reports: `scripts/traversal_study.sh` runs it.
+//! The study of traversal orders and triangle tests that docs/notebook/2026-11-22-which-child-first.md reports: `scripts/traversal_study.sh` runs it.
 //!
 //!     cargo run --release --example traversal_study -- orders SCENE... [--eye X,Y,Z --target X,Y,Z] [--json]
 //!     cargo run --release --example traversal_study -- tests SCENE...

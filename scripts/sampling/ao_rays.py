@@ -1,4 +1,4 @@
-"""How many occlusion rays for a camera ray: error and time of --ao-rays 1, 2, 4 and 8, relative to 1. docs/design/sampling.md has what it prints.
+"""How many occlusion rays for a camera ray: error and time of --ao-rays 1, 2, 4 and 8, relative to 1. docs/notebook/2026-11-29-occlusion-rays-for-a-camera-ray.md has what it prints.
 
     python3 scripts/sampling/ao_rays.py target/release/skylit SCENE [OPTION...]
 

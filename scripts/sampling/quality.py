@@ -1,4 +1,4 @@
-"""What --quality costs and leaves: samples, error and time beside a fixed number of samples with the same error. docs/design/sampling.md has what it prints.
+"""What --quality costs and leaves: samples, error and time beside a fixed number of samples with the same error. docs/notebook/2026-11-29-worth-of-a-quality.md has what it prints.
 
     python3 scripts/sampling/quality.py target/release/skylit [--size 320x180] [--qualities draft,good] [--runs 3] [--most 1024] NAME='SCENE OPTION...' ...
 

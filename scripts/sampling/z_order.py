@@ -1,5 +1,5 @@
 """Z-order scrambling of pixels that can be extended to any number of samples, beside the sampler of the renderer: on the host, on integrands of two and
-four dimensions. docs/design/sampling.md has what it prints. Needs numpy.
+four dimensions. docs/notebook/2026-11-22-z-order.md has what it prints. Needs numpy.
 
 Of index t = (Morton index of the pixel, digits of the sample index reversed), 8 digits of base 4 each, the points are P(1) t and P(w) t over GF(4), w a
 root of x^2 + x + 1, P(c) Pascal's matrix scaled by powers of c: the first 4^k samples of every aligned block of 4^a pixels are a (0, a + k, 2)-net in

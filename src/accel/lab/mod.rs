@@ -1,7 +1,7 @@
 //! The laboratory of hierarchies: builders for rays of a known distribution (Falcone, "Ray
 //! distribution aware heuristics for bounding volume hierarchies construction", 2024), local trees
 //! of the places that such rays come from, and an analysis of finished trees in counts. What is
-//! here runs on the host and for nobody who does not ask for it; docs/reference/bvh.md has what it
+//! here runs on the host and for nobody who does not ask for it; docs/design/bvh.md has what it
 //! found.
 
 pub mod analysis;

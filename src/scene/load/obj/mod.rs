@@ -1,9 +1,9 @@
 //! Wavefront OBJ with MTL.
 //!
 //! Read by a parser of our own, because no crate is fit for what users have;
-//! docs/reference/formats.md has what tobj, the one that is kept best, reads of it. obj-rs names no
-//! line of an error, wavefront_obj refuses vertex colours and relative indices, and nobject-rs and
-//! wavefront take broken numbers without a word.
+//! docs/notebook/2026-11-28-obj-parser.md has what tobj, the one that is kept best, reads of it.
+//! obj-rs names no line of an error, wavefront_obj refuses vertex colours and relative indices, and
+//! nobject-rs and wavefront take broken numbers without a word.
 //!
 //! Each run of faces with one object or group name and one material becomes a mesh. Polygons are
 //! cut into fans, or by ear clipping where a fan would reach outside of them. Corners without `vn`
