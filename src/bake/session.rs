@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use super::cage::Detailed;
 use super::map::{self, BakedMap, Traced};
@@ -18,11 +18,14 @@ use crate::gpu::Device;
 use crate::integrators::ao::Hemisphere;
 use crate::scene::builtin::shapes;
 use crate::scene::load::SourceFile;
-use crate::scene::{Instance, Mesh, Motion, Scene};
+use crate::scene::material::MaterialKind;
+use crate::scene::{Instance, Material, Mesh, Motion, Scene};
 use crate::tracer::{DeviceSettings, Needs, Tracer};
 
 /// Side of the ground plane, in diagonals of the scene.
 const GROUND: f64 = 20.0;
+/// Its linear base colour, which light maps see.
+const GROUND_COLOR: Vec4 = Vec4::new(0.5, 0.5, 0.5, 1.0);
 
 /// A scene and the device that bakes it.
 pub struct BakeSession<'a> {
@@ -143,7 +146,14 @@ impl BakeSession<'_> {
                 mesh: scene.meshes.len(),
                 object_to_world: glam::DAffine3::IDENTITY,
             });
-            scene.meshes.push(Mesh { name: "ground".to_owned(), geometry: floor, material: 0, source: None });
+            // of no material of the scene, which may emit
+            let material = scene.materials.len();
+            scene.materials.push(Material {
+                kind: MaterialKind::Matte,
+                base_color: GROUND_COLOR,
+                ..Material::default()
+            });
+            scene.meshes.push(Mesh { name: "ground".to_owned(), geometry: floor, material, source: None });
         }
 
         // other models, whose instances come last: the others keep their numbers

@@ -317,6 +317,10 @@ fn check(args: &BakeArgs) -> Result<Output> {
             "--ao-radius, --ao-falloff and --ao-normal have no effect on --map light",
         ),
         (
+            is_light && args.own_occluders() != Occluders::Scene,
+            "--occluders material: light comes from the whole scene with --map light",
+        ),
+        (
             !is_light && (args.lighting != LightingSettings::default() || has_path_options),
             "--environment, --light, --integrator and --max-depth are for --map light",
         ),
@@ -392,7 +396,7 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
         Ok::<_, Error>(scene)
     };
-    let detailed = args.from.as_deref().map(&mut load).transpose()?;
+    let mut detailed = args.from.as_deref().map(&mut load).transpose()?;
     let occluding = args.occluding_models().map(&mut load).collect::<Result<Vec<_>>>()?;
     let mut cage_model = args.cage_model().map(&mut load).transpose()?;
     if let Some(cage_model) = &mut cage_model {
@@ -403,6 +407,10 @@ pub fn run(args: &BakeArgs) -> Result<()> {
 
     // lights may be meshes, which have no textures
     lighting.apply(&mut scene)?;
+    if let Some(detailed) = &mut detailed {
+        // it is traced in place of the scene
+        lighting.apply(detailed)?;
+    }
     let unpacked = planned.iter().filter(|_| args.pack.is_some()).filter_map(|t| pack::partner(&scene, t).err());
     unpacked.for_each(|reason| warnings.add(&reason));
 

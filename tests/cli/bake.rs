@@ -230,6 +230,29 @@ fn squares(folder: &Path, name: &str, y: f32, tiles: &[[i32; 2]]) -> String {
     path.to_str().unwrap().to_owned()
 }
 
+/// A detailed model is lit by the lights of the command line, too, and all of the scene lights a surface.
+#[test]
+fn light_of_a_detailed_model() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = squares(dir.path(), "flat.obj", 0.0, &[[0, 0]]);
+    let exr = place(&dir, "light.exr");
+    let light = ["bake", &model, "-o", &exr, "--size", "8", "--spp", "4", "--map", "light", "--environment", "1,1,1"];
+    let run_with = |options: &[&str]| run(&[&light[..], options].concat());
+    for options in [&[][..], &["--from", &model], &["--ground"]] {
+        assert!(run_with(options).status.success(), "{options:?}");
+        let image = output::load(Path::new(&exr)).unwrap();
+        let values = image.f32("G").unwrap();
+        assert!(values.iter().all(|v| (v - 1.0).abs() < 1e-4), "{options:?}: {values:?}");
+    }
+    fails(&run_with(&["--occluders", "material"]), 64, &["--occluders material", "--map light"]);
+    fails(&run_with(&["--ao-radius", "1"]), 64, &["--ao-radius", "--map light"]);
+    fails(&run_with(&["--integrator", "ao"]), 64, &["--integrator ao", "ao-sky"]);
+    refuses(&["bake", &model, "-o", &exr, "--environment", "1,1,1"], 64, "for --map light");
+}
+
 #[test]
 fn tiles_have_an_image_each_and_models_new_coordinates() {
     if !device() {
