@@ -24,7 +24,7 @@ use crate::tracer::{DeviceSettings, Needs, Tracer};
 
 /// Side of the ground plane, in diagonals of the scene.
 const GROUND: f64 = 20.0;
-/// Its linear base colour, which light maps see.
+/// Linear base colour of the ground plane, which light maps see.
 const GROUND_COLOR: Vec4 = Vec4::new(0.5, 0.5, 0.5, 1.0);
 
 /// A scene and the device that bakes it.
