@@ -5,6 +5,7 @@
 // that comes first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE
+#include "trace/areas.glsl"
 #include "trace/primitive.glsl"
 #include "trace/slab.glsl"
 #include "trace/spread.glsl"
@@ -19,6 +20,24 @@ const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
 const uint LAST_NODE = 0x7ffffff0u;
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
+
+// Distance before which a ray's boxes are skipped: where it left an influence area, in whose tree all before it was found.
+#define BOX_START (HAS_AREAS ? start : world.tmin)
+// Share of the distance to where a ray leaves an area from which on the whole tree is traversed: far above rounding.
+const float BEFORE_LEAVING = 1.0 - 1e-6;
+
+// The tree in which a ray begins: that of an influence area, or of the whole scene.
+#define BEGIN_RAY                                                                                  \
+    current = is_ray(world) ? root.root : FINISHED;                                                \
+    if (HAS_AREAS) {                                                                               \
+        start = world.tmin;                                                                        \
+        area = is_ray(world) ? area_of(areas, world.origin, world.direction) : INVALID;            \
+        if (area != INVALID) {                                                                     \
+            AreaRecord record = AreaRecords(areas.areas).v[area];                                  \
+            current = record.root;                                                                 \
+            until = leave_area(record, world.origin, world.direction);                             \
+        }                                                                                          \
+    }
 
 // Distance at which the ray enters a box, or INFINITY for a miss.
 float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
@@ -41,6 +60,7 @@ void main() {
     uvec2 nodes = root.nodes;
     uvec2 primitives = root.primitives;
     InstanceRecords instances = InstanceRecords(root.instances);
+    AreasRecord areas = AreasRecord(root.areas);
 
     // Some CPU drivers leave any loop after 65,535 iterations. Rays that are not done when the loop ends are counted, and the host
     // reports them: their callbacks were not called.
@@ -60,11 +80,16 @@ void main() {
     vec3 inverse = safe_inverse(world.direction);
     uint instance = 0u;
     bool in_group = SINGLE_LEVEL;
-    uint current = is_ray(world) ? root.root : FINISHED;
+    uint current;
     float best = world.tmax;
     uint best_instance = INVALID;
     uint best_primitive = INVALID;
     vec2 best_uv = vec2(0.0);
+
+    // the influence area whose tree is traversed, if any, and where the ray leaves it
+    uint area = INVALID;
+    float until = 0.0, start = 0.0;
+    BEGIN_RAY
 
     while (true) {
         if (current < LAST_NODE) {
@@ -72,8 +97,8 @@ void main() {
             vec2 w0 = LOAD_FLOATS(nodes, at), w1 = LOAD_FLOATS(nodes, at + 1u), w2 = LOAD_FLOATS(nodes, at + 2u);
             vec2 w3 = LOAD_FLOATS(nodes, at + 3u), w4 = LOAD_FLOATS(nodes, at + 4u), w5 = LOAD_FLOATS(nodes, at + 5u);
             uvec2 w6 = LOAD_PAIR(nodes, at + 6u);
-            float near0 = enter_box(BINARY_NODE_BOXES_0(vec3), BINARY_NODE_BOXES_1(vec3), origin, inverse, world.tmin, best);
-            float near1 = enter_box(BINARY_NODE_BOXES_2(vec3), BINARY_NODE_BOXES_3(vec3), origin, inverse, world.tmin, best);
+            float near0 = enter_box(BINARY_NODE_BOXES_0(vec3), BINARY_NODE_BOXES_1(vec3), origin, inverse, BOX_START, best);
+            float near1 = enter_box(BINARY_NODE_BOXES_2(vec3), BINARY_NODE_BOXES_3(vec3), origin, inverse, BOX_START, best);
             bool swap;
             if (BY_DIRECTION) {
                 uint axis = current >> AXIS_SHIFT;
@@ -95,12 +120,23 @@ void main() {
             }
         }
         if ((current & LEAF) != 0u) {
-            if (SINGLE_LEVEL || in_group) {
+            bool in_area = HAS_AREAS && area != INVALID;
+            if (SINGLE_LEVEL || in_group || in_area) {
                 uint i = current & NODE_NUMBER;
+                vec3 own_origin = origin, own_direction = direction;
+                Shear own_shear = shear;
+                if (!SINGLE_LEVEL && in_area) {
+                    // an area's tree is over primitives of all instances, whose tests are those of their own space
+                    instance = Words(areas.instances).v[i - areas.first_primitive];
+                    InstanceRecord record = instances.v[instance];
+                    own_direction = transform_vector(record.world_to_group, world.direction);
+                    own_origin = transform_point(record.world_to_group, world.origin);
+                    own_shear = make_shear(own_direction);
+                }
                 uint primitive;
                 float t;
                 vec2 uv;
-                bool met = meets_record(primitives, i, instance, shear, origin, direction, world.tmin, best, primitive, t, uv);
+                bool met = meets_record(primitives, i, instance, own_shear, own_origin, own_direction, world.tmin, best, primitive, t, uv);
                 if (met) {
                     best = t;
                     best_instance = instance;
@@ -151,6 +187,18 @@ void main() {
 #endif
             }
         }
+        if (HAS_AREAS && current == FINISHED && area != INVALID) {
+            // within the area nothing is missing from its tree; beyond it, something may be closer than a hit out there
+            bool is_done = best <= until;
+#ifdef STREAM_ANY
+            is_done = is_done || best_primitive != INVALID;
+#endif
+            area = INVALID;
+            if (!is_done) {
+                start = max(until * BEFORE_LEAVING, world.tmin);
+                current = root.root;
+            }
+        }
         if (current == FINISHED) {
             bool met = best_primitive != INVALID;
 #ifdef STREAM_ANY
@@ -172,9 +220,9 @@ void main() {
             instance = 0u;
             in_group = SINGLE_LEVEL;
             depth = 0u;
-            current = is_ray(world) ? root.root : FINISHED;
             best = world.tmax;
             best_primitive = INVALID;
+            BEGIN_RAY
         }
     }
     if (left != 0u) atomicAdd(Counter(root.unfinished).v, left);

@@ -110,7 +110,7 @@ impl BakeSession<'_> {
                 _ => (FlatScene::new(scene), of_occlusion),
             };
             let (kind, _, compute) = self.tracing.choose(&self.device.info)?;
-            let build = self.tracing.build_options(rays * numbers.len() as u64);
+            let build = self.tracing.build_options(rays * numbers.len() as u64)?;
             let tracer = Tracer::with_build(self.device, kind, &flat, needs, compute, &build)?;
             build.take_warnings().iter().for_each(|w| control.warning(w));
             for number in numbers {

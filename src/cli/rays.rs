@@ -29,6 +29,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let mut plan = FilePlan::default();
     plan.reads("--mesh", &args.mesh);
     plan.reads("--rays", &args.rays);
+    args.device.areas_file().iter().for_each(|path| plan.reads("--build-areas", path));
     if let Some(hits) = &args.hits {
         plan.writes("--hits", hits);
         plan.check()?;
@@ -48,7 +49,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
     // the repeats and one warm-up pass
-    let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
+    let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1))?;
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     let stats = tracer.stats();

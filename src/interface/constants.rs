@@ -63,6 +63,8 @@ constants! {
     SUBGROUP_SIZE: uint = 8;
     #[doc = "An invocation that has made this many iterations fetches no further ray; 0: no limit."]
     MAX_ITERATIONS: uint = 0;
+    #[doc = "Influence areas have trees of their own, in the binary kernels."]
+    HAS_AREAS: bool = false;
     #[doc = "Bent normals are computed."]
     BENT_NORMALS: bool = false;
     #[doc = "Steps of the filter have strides: pixels between taps are left out."]

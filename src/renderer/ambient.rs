@@ -33,6 +33,7 @@ impl Renderer {
             needs: integrator.needs(&settings.integrators),
             streams: integrator.streams(&settings.integrators),
             rays: integrator.rays_per_sample() * job.samples.count(),
+            camera: Some(&camera),
             control: &mut *control,
             warnings: &mut warnings,
         };

@@ -177,6 +177,9 @@ impl DefaultsFile {
         for path in [&mut s.frames.camera_path, &mut s.film.resume, &mut self.device.bvh_cache].into_iter().flatten() {
             *path = folder.join(&*path);
         }
+        if let Some(path) = self.device.areas_file() {
+            self.device.build_areas = Some(folder.join(path).to_string_lossy().into_owned());
+        }
         if let Some(path) = s.lighting.environment_file() {
             s.lighting.environment = Some(folder.join(path).to_string_lossy().into_owned());
         }

@@ -121,6 +121,7 @@ impl Renderer {
             needs: frame_needs(&settings, &realtime_settings),
             streams: frame_streams(&settings, &realtime_settings),
             rays: samples.saturating_mul(1 + u64::from(realtime_settings.rays_per_pixel) * rays_per_sample),
+            camera: Some(&camera),
             control: &mut *control,
             warnings: &mut warnings,
         };

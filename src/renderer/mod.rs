@@ -51,7 +51,7 @@ use crate::gpu::{Device, KeptPipelines};
 use crate::integrators::lighting::LightingSettings;
 use crate::output::Image;
 use crate::scene::load::{self, LoadOptions};
-use crate::scene::{Environment, Scene, SceneSettings};
+use crate::scene::{Camera, Environment, Scene, SceneSettings};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 use survey::own_light::OwnLight;
@@ -283,6 +283,8 @@ struct TracerRequest<'a> {
     streams: Vec<&'static StreamShaders>,
     /// Approximate number of rays that will be traced.
     rays: u64,
+    /// The camera of the images; `None` if it will move.
+    camera: Option<&'a Camera>,
     control: &'a mut dyn Control,
     warnings: &'a mut Vec<String>,
 }
@@ -313,8 +315,11 @@ impl TracerRequest<'_> {
         compute: ComputeOptions,
         settings: &DeviceSettings,
     ) -> Result<Tracer> {
-        let mut build = settings.build_options(self.rays);
+        let mut build = settings.build_options(self.rays)?;
         build.streams.extend(self.streams);
+        if let Some(local) = &mut build.local {
+            local.camera = self.camera.cloned();
+        }
         let tracer = Tracer::with_build(device, kind, flat, self.needs, compute, &build)?;
         for warning in build.take_warnings() {
             self.control.warning(&warning);

@@ -109,7 +109,12 @@ impl Setup {
         settings: &SceneSettings,
         warnings: Vec<String>,
     ) -> Self {
-        let (scene, info) = (flat.scene, &renderer.device.info);
+        let (scene, info, stats) = (flat.scene, &renderer.device.info, tracer.stats());
+        let mut features = tracer.features().explain(flat);
+        if stats.areas > 0 {
+            let (areas, primitives) = (stats.areas, stats.area_primitives);
+            features.push(format!("{areas} influence areas, whose trees hold {primitives} primitives"));
+        }
         Self {
             scene: renderer.name.clone(),
             scene_options: renderer.scene_options(settings),
@@ -124,8 +129,8 @@ impl Setup {
             driver: info.driver.clone(),
             tracer: renderer.kind,
             tracer_reason: renderer.kind_reason.clone(),
-            stats: tracer.stats(),
-            features: tracer.features().explain(flat),
+            stats,
+            features,
             warnings,
             open: renderer.open_seconds,
             wants_depth_image: scene.hints.depth_image,
@@ -153,6 +158,8 @@ impl Setup {
                 "scene_bytes": self.stats.scene_bytes,
                 "bytes_per_primitive": self.stats.bytes_per_primitive(),
                 "stack_entries": self.stats.stack_entries,
+                "areas": self.stats.areas,
+                "area_primitives": self.stats.area_primitives,
             },
             "seconds": seconds,
         });

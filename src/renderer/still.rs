@@ -318,6 +318,7 @@ impl<'a> StillRender<'a> {
             needs: Needs { normals: needs.normals || is_denoised, ..needs },
             streams: self.integrator.streams(&settings.integrators),
             rays: self.integrator.rays_per_sample() * self.job.samples.count(),
+            camera: Some(&self.completed.camera),
             control,
             warnings: &mut self.warnings,
         };

@@ -49,5 +49,6 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         few: None,
         launch: None,
         dynamic: None,
+        areas: None,
     })
 }

@@ -34,7 +34,9 @@ impl Trees {
                 Kernel::Wide
             )));
         }
-        if options.heuristic.is_some() && !matches!(kernel, Kernel::Nearest | Kernel::Direction) {
+        if (options.heuristic.is_some() || options.local.is_some())
+            && !matches!(kernel, Kernel::Nearest | Kernel::Direction)
+        {
             return Err(Error::Usage(format!(
                 "traversal '{kernel}' takes no tree of a heuristic; use --traversal {}",
                 Kernel::Nearest
@@ -42,7 +44,7 @@ impl Trees {
         }
         Ok(match kernel {
             Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
-            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options), kernel),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options)?, kernel),
             Kernel::Brute => {
                 brute::check(flat)?;
                 Trees::None

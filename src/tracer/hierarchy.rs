@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::dynamic_trees::DynamicTrees;
 use super::kernel::Kernel;
 use super::lane_budget::stack_constant;
+use super::local_trees::AreaBuffers;
 use super::stream::LaunchMemory;
 use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
@@ -37,6 +38,8 @@ pub(super) struct Hierarchy {
     pub launch: Option<LaunchMemory>,
     /// State to update it in a dynamic scene (fast kernel only).
     pub dynamic: Option<Box<DynamicTrees>>,
+    /// Influence areas that have trees of their own (binary kernels only).
+    pub areas: Option<AreaBuffers>,
 }
 
 impl Hierarchy {
@@ -72,7 +75,8 @@ impl Hierarchy {
     }
 
     pub fn bytes(&self) -> u64 {
-        self.nodes.size() + self.primitives.as_ref().map_or(0, Buffer::size)
+        let areas = self.areas.as_ref().map_or(0, AreaBuffers::bytes);
+        self.nodes.size() + self.primitives.as_ref().map_or(0, Buffer::size) + areas
     }
 
     /// See [`DynamicTrees::deform`].

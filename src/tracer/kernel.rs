@@ -3,8 +3,10 @@
 use crate::accel::BuildPreset;
 use crate::accel::cache::Cache;
 use crate::accel::flatten::FlatScene;
+use crate::accel::lab::influence::InfluenceArea;
 use crate::accel::lab::{Builder, Heuristic};
 use crate::gpu::DeviceInfo;
+use crate::scene::Camera;
 use crate::settings::choices;
 use crate::shaders::StreamShaders;
 
@@ -70,6 +72,18 @@ pub struct ComputeOptions {
     pub triangle_test: TriangleTest,
 }
 
+/// Trees of influence areas: places from which rays of a known distribution start (Falcone 2024).
+/// Hits are the same without them.
+#[derive(Clone, Debug)]
+pub struct LocalOptions {
+    /// The areas, in world space; `None` for those of the scene's lights and cameras.
+    pub areas: Option<Vec<InfluenceArea>>,
+    /// The camera of the image, which may be none of the scene's.
+    pub camera: Option<Camera>,
+    /// Rules of the trees; their rays are those of each area.
+    pub heuristic: Heuristic,
+}
+
 /// Build options of the compute tracer's BVH; drivers build those of the hardware tracers.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
@@ -78,6 +92,8 @@ pub struct BuildOptions {
     /// Rules of the laboratory in place of a preset, for the binary kernels only. Its rays are in
     /// world space.
     pub heuristic: Option<Heuristic>,
+    /// Trees of influence areas besides that of the scene, for the binary kernels only.
+    pub local: Option<LocalOptions>,
     /// Approximate number of rays that will be traced.
     pub rays: u64,
     /// Cache of built hierarchies, used for those of the wide kernel only; `None` caches nothing.
@@ -89,7 +105,14 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { preset: Some(BuildPreset::Default), heuristic: None, rays: 0, cache: None, streams: Vec::new() }
+        Self {
+            preset: Some(BuildPreset::Default),
+            heuristic: None,
+            local: None,
+            rays: 0,
+            cache: None,
+            streams: Vec::new(),
+        }
     }
 }
 

@@ -21,6 +21,7 @@ mod hierarchy;
 mod kernel;
 mod kind;
 mod lane_budget;
+mod local_trees;
 mod mipmap;
 mod needs;
 mod precompiled;
@@ -43,7 +44,7 @@ use std::time::Instant;
 
 pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
 pub use gpu_scene::MaterialChange;
-pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
+pub use kernel::{BuildOptions, ComputeOptions, Kernel, LocalOptions, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
 pub use needs::Needs;
 pub use raster_instance::RasterInstance;
@@ -57,6 +58,7 @@ use crate::accel::features::SceneFeatures;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
+use crate::interface::constants;
 use crate::shaders::{self, ComputeShader, Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use hierarchy::Hierarchy;
@@ -85,6 +87,10 @@ pub struct BuildStats {
     pub primitives: u64,
     /// Capacity of the compute tracer's traversal stack, in entries; 0 for the hardware tracers.
     pub stack_entries: u32,
+    /// Influence areas that have trees of their own; 0 for all but the binary kernels.
+    pub areas: u32,
+    /// Primitives in the trees of influence areas: one may be in several.
+    pub area_primitives: u64,
     /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for
     /// scenes of several trees.
     pub sah_cost: Option<f64>,
@@ -209,6 +215,7 @@ impl Tracer {
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;
                 stats.structure_bytes = h.bytes();
+                (stats.areas, stats.area_primitives) = h.areas.as_ref().map_or((0, 0), |a| (a.count, a.primitives));
                 Structure::Compute(Box::new(h))
             }
             None => {
@@ -353,6 +360,7 @@ impl Tracer {
                 let (rays_per_lane, _) = lane_budget(info);
                 match h.kernel {
                     Kernel::Nearest | Kernel::Direction => {
+                        let all = all.set(constants::HAS_AREAS, h.areas.is_some());
                         Stream::reference(&self.device, shaders, &all, rays_per_lane)
                     }
                     Kernel::Brute => Stream::brute(&self.device, shaders, &all),

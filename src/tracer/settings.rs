@@ -1,16 +1,17 @@
 //! Settings of ray tracing: the device, the tracer, and the options of the compute tracer.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use crate::accel::BuildPreset;
 use crate::accel::cache::Cache;
+use crate::accel::lab::influence::Placement;
 use crate::accel::lab::{Builder, HeuristicChoice, RayDistribution};
 use crate::error::{Error, Result};
 use crate::settings::parse::parse_vector;
 use crate::settings::{AppliesTo, choices, settings};
-use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTest};
+use crate::tracer::{BuildOptions, ComputeOptions, Kernel, LocalOptions, TracerKind, TriangleTest};
 
 choices! {
     /// Which tracer to use.
@@ -145,6 +146,12 @@ settings! {
         /// Point through which the rays pass that --build sah-spfh and pah... are for
         build_eye: Option<DVec3>,
             option(value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true), applies(AppliesTo::ALL), research;
+        /// Also build trees of influence areas by --build: `scene`, its lights and cameras, or a file
+        ///
+        /// A ray that starts in an area and agrees with its rays is traced in the area's tree first.
+        /// Images are the same.
+        build_areas: Option<String>,
+            option(value_name = "FILE.json|scene", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["build_direction", "build_eye"]), applies(AppliesTo::ALL), research;
         /// Cache the compute tracer's BVHs in this folder, and reuse them [env: SKYLIT_BVH_CACHE]
         ///
         /// A BVH is reused for the same geometry.
@@ -168,14 +175,42 @@ impl DeviceSettings {
     }
 
     /// Build options of the compute tracer's BVH, for about `rays` rays.
-    pub fn build_options(&self, rays: u64) -> BuildOptions {
+    ///
+    /// # Errors
+    /// Those of [`Placement::read_list`] for a file of influence areas.
+    pub fn build_options(&self, rays: u64) -> Result<BuildOptions> {
         let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
-        BuildOptions {
+        let heuristic = self.build().heuristic().map(|h| h.heuristic(self.build_rays().unwrap_or_default()));
+        let local = match (&self.build_areas, heuristic) {
+            (Some(_), Some(heuristic)) => {
+                let areas = self.areas_file().map(Placement::read_list).transpose()?;
+                let areas = areas.map(|list| list.iter().map(|p| p.area(DVec3::ZERO)).collect());
+                Some(LocalOptions { areas, camera: None, heuristic })
+            }
+            _ => None,
+        };
+        Ok(BuildOptions {
             preset: self.build().preset(),
-            heuristic: self.build().heuristic().map(|h| h.heuristic(self.build_rays().unwrap_or_default())),
+            heuristic: heuristic.filter(|_| local.is_none()),
+            local,
             rays,
             cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
             streams: Vec::new(),
+        })
+    }
+
+    /// The file of influence areas that have trees of their own, if they come from one.
+    pub fn areas_file(&self) -> Option<&Path> {
+        self.build_areas.as_deref().filter(|a| *a != "scene").map(Path::new)
+    }
+
+    /// The builder of the trees of a scene's groups and of its top level, for rays relative to
+    /// `origin`; the default preset where numbers of primitives and rays choose.
+    pub fn builder(&self, origin: DVec3) -> Builder {
+        match self.build().builder(self.build_rays().unwrap_or_default()) {
+            Builder::Heuristic(_) if self.build_areas.is_some() => Builder::Preset(BuildPreset::default()),
+            Builder::Heuristic(h) => Builder::Heuristic(h.for_rays(h.rays.relative_to(origin))),
+            preset => preset,
         }
     }
 
@@ -197,6 +232,7 @@ impl DeviceSettings {
             (self.build() != BuildMethod::Auto, "--build"),
             (self.build_direction.is_some(), "--build-direction"),
             (self.build_eye.is_some(), "--build-eye"),
+            (self.build_areas.is_some(), "--build-areas"),
             (self.bvh_cache.is_some(), "--bvh-cache"),
         ];
         given.into_iter().find_map(|(given, name)| given.then_some(name))
@@ -235,6 +271,11 @@ impl DeviceSettings {
     /// Checks the options of builds for known rays.
     fn check_heuristic(&self) -> Result<()> {
         let rays = match (self.build_direction, self.build_eye) {
+            (Some(_), _) | (_, Some(_)) if self.build_areas.is_some() => {
+                return Err(Error::Usage(
+                    "--build-areas says what the rays are: leave out --build-direction and --build-eye".into(),
+                ));
+            }
             (Some(d), _) if d == DVec3::ZERO => {
                 return Err(Error::Usage("--build-direction 0,0,0 is no direction: give another".into()));
             }
@@ -247,8 +288,13 @@ impl DeviceSettings {
             (Some(_), _) if !matches!(self.traversal, Some(Kernel::Nearest | Kernel::Direction)) => Err(Error::Usage(
                 format!("--build {build} is for the binary kernels only: add --traversal nearest or direction"),
             )),
+            (None, _) if self.build_areas.is_some() => Err(Error::Usage(format!(
+                "--build-areas has no effect on --build {build}: leave it out, or use --build pah-spfh"
+            ))),
+            (Some(_), None) if self.build_areas.is_some() => Ok(()),
             (Some(h), None) if h.needs_rays() => Err(Error::Usage(format!(
-                "--build {build} is for rays that are known: add --build-direction X,Y,Z or --build-eye X,Y,Z"
+                "--build {build} is for rays that are known: add --build-direction X,Y,Z, --build-eye X,Y,Z or \
+                 --build-areas scene"
             ))),
             (h, Some(option)) if !h.is_some_and(HeuristicChoice::needs_rays) => Err(Error::Usage(format!(
                 "{option} has no effect on --build {build}: leave it out, or use --build pah-spfh"
@@ -311,6 +357,9 @@ mod tests {
             ("--traversal wide --build sah", "--build sah is for the binary kernels only"),
             ("--traversal nearest --build pah", "--build pah is for rays that are known"),
             ("--traversal nearest --build sah --build-eye 1,2,3", "--build-eye has no effect on --build sah"),
+            ("--traversal nearest --build-areas scene", "--build-areas has no effect on --build auto"),
+            ("--build pah --build-areas scene", "--build pah is for the binary kernels only"),
+            ("--tracer query --build-areas scene", "--build-areas has no effect"),
             ("--build-direction 1,2,3", "--build-direction has no effect on --build auto"),
             ("--traversal nearest --build pah --build-direction 0,0,0", "--build-direction 0,0,0 is no direction"),
             ("--traversal direction --bvh-cache d", "--bvh-cache has no effect on --traversal direction"),
@@ -324,6 +373,8 @@ mod tests {
             "--traversal nearest --build fast",
             "--traversal nearest --build sah",
             "--traversal direction --build pah-spfh --build-direction 0,-1,0",
+            "--traversal nearest --build pah --build-areas scene",
+            "--traversal nearest --build sah-longest --build-areas areas.json",
         ] {
             assert_eq!(refused(line), None, "{line}");
         }

@@ -155,6 +155,7 @@ impl Trees {
             bounds,
             unfinished: unfinished_counter(device)?,
             dynamic: dynamic.map(|mut d| d.keep_copy(device, &nodes).map(|()| d)).transpose()?,
+            areas: None,
             nodes,
             few: few.transpose()?,
             launch: Some(LaunchMemory {

@@ -12,7 +12,7 @@ use super::request::Request;
 use crate::accel::Aabb;
 use crate::accel::flatten::FlatScene;
 use crate::accel::lab::influence::areas_of_scene;
-use crate::accel::lab::{Builder, Hierarchy, LabRay, Query, Visits, hull};
+use crate::accel::lab::{Hierarchy, LabRay, Query, Visits, hull};
 use crate::film::camera::{self, Choice};
 use crate::scene::{Scene, SceneSettings};
 use crate::tracer::{BuildMethod, DeviceSettings};
@@ -107,7 +107,7 @@ impl HierarchyState {
 pub struct HierarchyKey {
     load: u64,
     meaning: SceneSettings,
-    build: (BuildMethod, Option<DVec3>, Option<DVec3>),
+    build: (BuildMethod, Option<DVec3>, Option<DVec3>, bool),
     animation: Option<usize>,
 }
 
@@ -119,7 +119,7 @@ impl HierarchyKey {
             load: request.load,
             // materials are edited without building anything anew
             meaning: SceneSettings { material: Vec::new(), ..request.meaning.clone() },
-            build: (device.build(), device.build_direction, device.build_eye),
+            build: (device.build(), device.build_direction, device.build_eye, device.build_areas.is_some()),
             animation: request.animation,
         }
     }
@@ -221,12 +221,7 @@ impl SceneHierarchy {
             ));
         }
         let flat = FlatScene::new(scene);
-        let builder = match settings.build().builder(settings.build_rays().unwrap_or_default()) {
-            // rays are given in world space
-            Builder::Heuristic(h) => Builder::Heuristic(h.for_rays(h.rays.relative_to(flat.origin))),
-            preset => preset,
-        };
-        let tree = Hierarchy::build(&flat, &builder);
+        let tree = Hierarchy::build(&flat, &settings.builder(flat.origin));
         if tree.root_tree().is_none_or(|root| root.nodes.is_empty()) {
             return Err("The hierarchy is not shown: the scene has no surfaces.".into());
         }

@@ -3,7 +3,8 @@
 
 use skylit::accel::BuildPreset;
 use skylit::accel::flatten::FlatScene;
-use skylit::accel::lab::{HeuristicChoice, RayDistribution};
+use skylit::accel::lab::influence::{InfluenceArea, Placement, areas_of_scene};
+use skylit::accel::lab::{HeuristicChoice, LabRay, RayDistribution};
 use skylit::film::{NoControl, camera};
 use skylit::gpu::Device;
 use skylit::integrators::rays::{Mode, trace};
@@ -13,7 +14,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::Ray;
 use skylit::scene::Scene;
-use skylit::tracer::{BuildOptions, ComputeOptions, Kernel, Tracer, TracerKind, TriangleTest};
+use skylit::tracer::{BuildOptions, ComputeOptions, Kernel, LocalOptions, Tracer, TracerKind, TriangleTest};
 use std::sync::Arc;
 
 use crate::common;
@@ -204,6 +205,87 @@ fn gpu_parity_of_heuristics() {
     let refused = Tracer::with_build(&device, TracerKind::Compute, &FlatScene::new(&scene), common::ALL, wide, &build);
     let Err(e) = refused else { panic!("the wide kernel took a heuristic") };
     assert!(e.exit_code() == 64 && e.to_string().contains("--traversal nearest"), "{e}");
+    assert_validation_clean(&device);
+}
+
+/// Trees of influence areas change no hit: not of rays that start in an area and agree with its own, of which many hit within the
+/// area and many beyond it, and not of any other. The scenes are of one level and of two, with spheres and alpha, some far from
+/// the origin, and their areas are found by a list or by an octree.
+#[test]
+fn gpu_parity_of_influence_areas() {
+    use glam::{DAffine3, DVec3};
+    let device = device();
+    let mut far = scene("grid:3");
+    far.cameras.clear();
+    far.instances.iter_mut().for_each(|i| {
+        i.object_to_world = DAffine3::from_translation(DVec3::new(3e4, -2e3, 5e4)) * i.object_to_world;
+    });
+    let mut scenes: Vec<(&str, Scene)> =
+        ["cornell-box", "grid:3", "cornell-spheres", "leaf-cards"].map(|name| (name, scene(name))).into();
+    scenes.push(("grid:3, far away", far));
+    for (name, scene) in &scenes {
+        let flat = FlatScene::new(scene);
+        let (lo, hi) = scene.bounds().unwrap();
+        let (middle, size) = ((lo + hi) * 0.5, hi - lo);
+
+        // a box of parallel rays and a frustum that both end within the scene, and those of its lights and camera
+        let sun = DVec3::new(0.3, -1.0, 0.2).normalize();
+        let placement = |kind: &str, origin: DVec3, direction: DVec3, far: f64| -> Placement {
+            let side = size.max_element();
+            serde_json::from_value(serde_json::json!({
+                "kind": kind, "origin": origin.to_array(), "direction": direction.to_array(), "half_width": 0.6 * side,
+                "half_height": 0.3 * side, "fov_x_degrees": 110, "fov_y_degrees": 80, "far": far,
+            }))
+            .unwrap()
+        };
+        let lamp = middle + size * DVec3::new(0.1, 0.3, 0.2);
+        let given = [
+            placement("plane", middle - sun * size.length() * 0.5, sun, 0.6 * size.length()),
+            placement("point", lamp, DVec3::new(0.1, -1.0, 0.1), 0.5 * size.length()),
+        ];
+        let few: Vec<InfluenceArea> = given.iter().map(|p| p.area(DVec3::ZERO)).collect();
+        let own = areas_of_scene(scene, &[camera::choose(scene, &camera::Choice::Auto, 1.0).unwrap()], DVec3::ZERO);
+        let many: Vec<InfluenceArea> = few.iter().chain(&own).cycle().take(12).cloned().collect();
+
+        // rays of every kind, and half of them turned towards the sun or the lamp
+        let oracle = Oracle::new(scene, scene.origin());
+        let mut rays = ray_set(&oracle, scene, 60_000.min(ray_count()));
+        let at_lamp = (lamp - flat.origin).as_vec3();
+        for (k, ray) in rays.iter_mut().enumerate() {
+            let origin = glam::Vec3::from_array(ray.origin);
+            match k % 4 {
+                0 => ray.direction = sun.as_vec3().to_array(),
+                1 => ray.direction = (-sun).as_vec3().to_array(),
+                2 if origin != at_lamp => ray.direction = (at_lamp - origin).to_array(),
+                _ => {}
+            }
+        }
+        let affine =
+            rays.iter().filter(|r| few.iter().any(|a| a.relative_to(flat.origin).is_affine(&LabRay::from(*r))));
+        assert!(affine.count() > rays.len() / 10, "{name}: hardly a ray is asked for an area");
+
+        let distances = |local: Option<LocalOptions>, kernel, mode| {
+            let build = BuildOptions { local, ..Default::default() };
+            let areas = build.local.as_ref().map_or(0, |l| l.areas.as_ref().map_or(1, |a| a.len() as u32));
+            let t = Tracer::with_build(&device, TracerKind::Compute, &flat, common::ALL, kernel, &build).unwrap();
+            assert!(t.stats().areas >= areas && (areas == 0) == (t.stats().area_primitives == 0), "{name}");
+            let hits = trace(&t, &rays, mode, 1, &mut NoControl).unwrap().0;
+            hits.iter().map(|h| if mode == Mode::Any { h.is_hit() as u32 } else { h.t.to_bits() }).collect::<Vec<_>>()
+        };
+        let heuristic = HeuristicChoice::PahSpfh.heuristic(RayDistribution::Uniform);
+        for mode in [Mode::Closest, Mode::Any] {
+            let expected = distances(None, Kernel::Nearest.into(), mode);
+            for (kernel, areas) in
+                [(Kernel::Nearest, Some(few.clone())), (Kernel::Direction, Some(many.clone())), (Kernel::Nearest, None)]
+            {
+                let camera = camera::choose(scene, &camera::Choice::Auto, 1.0).ok();
+                let count = areas.as_ref().map(Vec::len);
+                let found = distances(Some(LocalOptions { areas, camera, heuristic }), kernel.into(), mode);
+                let differing = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+                assert_eq!(differing, 0, "{name} {kernel} {mode:?}, areas: {count:?}");
+            }
+        }
+    }
     assert_validation_clean(&device);
 }
 

@@ -39,12 +39,18 @@ impl InfluenceArea {
         Self { name, region, rays, agreement: AGREEMENT }
     }
 
+    /// The same area as seen from another origin.
+    pub fn relative_to(&self, origin: DVec3) -> Self {
+        Self { region: self.region.relative_to(origin), rays: self.rays.relative_to(origin), ..self.clone() }
+    }
+
     /// Whether a ray is one of those that the area's tree is built for: it starts inside, and its
     /// direction agrees, forwards or backwards.
     pub fn is_affine(&self, ray: &LabRay) -> bool {
         let agrees = |d: DVec3| d.dot(ray.direction).abs() >= self.agreement * d.length() * ray.direction.length();
         // a ray that starts at the eye has any direction
-        self.region.contains(ray.origin) && self.rays.direction_at(ray.origin).is_none_or(agrees)
+        let is_any = |d: DVec3| d.length() <= self.region.slack() || agrees(d);
+        self.region.contains(ray.origin) && self.rays.direction_at(ray.origin).is_none_or(is_any)
     }
 
     /// A box around some points in the frame of a direction.

@@ -155,8 +155,9 @@ impl<'b> LocalTrees<'b> {
     }
 }
 
-/// The tree over the primitives that touch an area.
-fn local_tree(body: &Body, boxes: &[Aabb], area: &InfluenceArea, heuristic: &Heuristic) -> Bvh2 {
+/// The tree over the primitives of a body, each with a box, that touch an area; its leaves refer to
+/// primitives of the body.
+pub fn local_tree(body: &Body, boxes: &[Aabb], area: &InfluenceArea, heuristic: &Heuristic) -> Bvh2 {
     let around = area.region.bounds();
     let overlaps = |b: &Aabb| b.min.cmple(around.max).all() && b.max.cmpge(around.min).all();
     let touching: Vec<u32> = (0..boxes.len())
@@ -200,12 +201,15 @@ fn is_around(b: &Aabb, p: DVec3) -> bool {
 
 /// An octree over the areas' boxes (his appendix A): a cell is divided as long as the border of an
 /// area passes through it.
-struct Octree {
-    bounds: Aabb,
-    cells: Vec<Cell>,
+pub struct Octree {
+    /// The root's cell.
+    pub bounds: Aabb,
+    /// All cells, the root first.
+    pub cells: Vec<Cell>,
 }
 
-enum Cell {
+/// A cell of an octree.
+pub enum Cell {
     /// Index of the first of eight cells, by upper halves along x, y, z in bits 0 to 2.
     Divided(usize),
     /// The areas that touch it.
@@ -213,7 +217,8 @@ enum Cell {
 }
 
 impl Octree {
-    fn build(areas: &[InfluenceArea]) -> Self {
+    /// Builds the octree over some areas.
+    pub fn build(areas: &[InfluenceArea]) -> Self {
         let bounds = areas.iter().map(|a| a.region.bounds()).fold(Aabb::EMPTY, Aabb::union);
         let mut cells = vec![Cell::Leaf(Vec::new())];
         let mut work = vec![(0usize, bounds, (0..areas.len() as u32).collect::<Vec<_>>(), 0u32)];

@@ -15,7 +15,8 @@ pub struct Region {
     planes: [(DVec3, f64); 6],
     /// Directions of the edges.
     edges: Vec<DVec3>,
-    /// Distance within which things count as touching: far above rounding.
+    /// Distance within which things count as touching: far above the rounding of single precision,
+    /// in which rays are recorded.
     slack: f64,
 }
 
@@ -63,7 +64,34 @@ impl Region {
             (n, n.dot(corners[at]))
         });
         let reach = corners.iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
-        Self { corners, planes, edges: [&[right, up], &sides[..]].concat(), slack: 1e-9 * reach }
+        Self { corners, planes, edges: [&[right, up], &sides[..]].concat(), slack: 1e-6 * reach }
+    }
+
+    /// The same region with more slack: within this distance of it, too, things count as touching.
+    pub fn widened(&self, by: f64) -> Self {
+        Self { slack: self.slack + by, ..self.clone() }
+    }
+
+    /// The same region as seen from another origin.
+    pub fn relative_to(&self, origin: DVec3) -> Self {
+        let corners = self.corners.map(|c| c - origin);
+        Self { corners, planes: self.planes.map(|(n, d)| (n, d - n.dot(origin))), ..self.clone() }
+    }
+
+    /// The distance within which things count as touching.
+    pub fn slack(&self) -> f64 {
+        self.slack
+    }
+
+    /// The largest coordinate of a corner.
+    pub fn reach(&self) -> f64 {
+        self.corners.iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()))
+    }
+
+    /// Outward normals of unit length of its faces, and their distances from the origin: a point p
+    /// is inside where n.p is at most the distance.
+    pub fn planes(&self) -> &[(DVec3, f64); 6] {
+        &self.planes
     }
 
     /// The corners.

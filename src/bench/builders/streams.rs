@@ -8,8 +8,10 @@ use super::BuilderSession;
 use crate::accel::BuildPreset;
 use crate::accel::flatten::FlatScene;
 use crate::accel::lab::analysis::analyse;
+use crate::accel::lab::builder::MAX_LEAF;
 use crate::accel::lab::cells::{CellKind, Cells};
-use crate::accel::lab::influence::areas_of_rays;
+use crate::accel::lab::influence::{InfluenceArea, areas_of_rays};
+use crate::accel::lab::local::{FallbackStart, LocalTrees, TopLevelKind};
 use crate::accel::lab::projection::frame;
 use crate::accel::lab::streams::{RayStream, corners, image_streams};
 use crate::accel::lab::{Body, Builder, HeuristicChoice, Hierarchy, LabRay, Query, RayDistribution, Visits};
@@ -22,7 +24,10 @@ use crate::ray::Ray;
 use crate::report::thousands;
 use crate::scene::Scene;
 use crate::terminal::interrupt::{self, SilentControl};
-use crate::tracer::{BuildOptions, Kernel, Needs, TracerKind};
+use crate::tracer::{BuildOptions, Kernel, LocalOptions, Needs, TracerKind};
+
+/// Rules by which trees of influence areas are built.
+const LOCAL_RULES: [HeuristicChoice; 3] = [HeuristicChoice::Sah, HeuristicChoice::Pah, HeuristicChoice::PahSpfh];
 
 /// A tree to measure: its name, its builder, and whether the scene is turned so that the rays lie
 /// along an axis.
@@ -116,6 +121,13 @@ pub fn scene(session: &mut BuilderSession, source: &str) -> Result<()> {
             }
             interrupt::check()?;
         }
+        if !areas.is_empty() {
+            for choice in LOCAL_RULES {
+                session.phase(format!("{source}: {}, trees of areas by {}", stream.name, choice.name()));
+                run_local(session, source, &flat, stream, choice, &areas)?;
+                interrupt::check()?;
+            }
+        }
         for (kind, cells, seconds) in &cells {
             count_cells(session, source, stream, *kind, cells, *seconds);
         }
@@ -170,7 +182,15 @@ fn run(
     let exhaustive = hierarchy.visits(&stream.rays, Query::Exhaustive).0;
     let single = hierarchy.top.is_none().then(|| &hierarchy.groups[0]);
     let analysis = single.map(|(tree, _)| analyse(tree, None, rays));
-    let rates = if session.args.counts { None } else { rates(session, flat, stream, contestant)? };
+    let build = match contestant.builder {
+        Builder::Preset(preset) => BuildOptions { preset: Some(preset), ..Default::default() },
+        // in world space
+        Builder::Heuristic(h) => {
+            let heuristic = Some(h.for_rays(h.rays.relative_to(-flat.origin)));
+            BuildOptions { heuristic, ..Default::default() }
+        }
+    };
+    let rates = rates(session, flat, stream, &build)?;
     let n = stream.rays.len() as f64;
     let mut row = session.record.row(source, &stream.name, &contestant.name);
     row.exact(quantity::RAY_COST, visits.cost() / n).exact(quantity::NODES, visits.nodes as f64 / n);
@@ -210,22 +230,53 @@ fn count_cells(
     row.exact(plain("build", "ms"), 1e3 * seconds).exact(plain("hits", ""), hits as f64 / n);
 }
 
-/// Rates of the binary kernel on the device.
+/// Builds trees of the influence areas of a stream's rays beside the default tree, counts, and
+/// traces on the device. The areas are relative to the origin of `flat`.
+fn run_local(
+    session: &mut BuilderSession,
+    source: &str,
+    flat: &FlatScene,
+    stream: &RayStream,
+    choice: HeuristicChoice,
+    areas: &[InfluenceArea],
+) -> Result<()> {
+    let heuristic = choice.heuristic(RayDistribution::Uniform);
+    let body = Body::from_scene(flat)?;
+    let whole = Builder::Preset(BuildPreset::Default).tree(&body.boxes(), MAX_LEAF);
+    let start = Instant::now();
+    let top = (TopLevelKind::List, FallbackStart::Exit);
+    let trees = LocalTrees::build(&body, &whole, areas.to_vec(), heuristic, top);
+    let seconds = start.elapsed().as_secs_f64();
+    let visits = trees.visits(&stream.rays, stream.query);
+    let both = visits.local.plus(visits.whole);
+
+    // areas are given in world space
+    let world = areas.iter().map(|a| a.relative_to(-flat.origin)).collect();
+    let local = LocalOptions { areas: Some(world), camera: None, heuristic };
+    let build = BuildOptions { local: Some(local), ..Default::default() };
+    let rates = rates(session, flat, stream, &build)?;
+    let n = stream.rays.len() as f64;
+    let mut row = session.record.row(source, &stream.name, &format!("areas: {}", choice.name()));
+    row.exact(quantity::RAY_COST, both.cost() / n).exact(quantity::NODES, both.nodes as f64 / n);
+    row.exact(plain("primitives a ray", ""), both.primitives as f64 / n);
+    row.exact(plain("areas a ray", ""), visits.top as f64 / n);
+    row.exact(plain("affine", ""), visits.affine as f64 / n);
+    row.repeated(quantity::RATE, rates);
+    row.exact(plain("build", "ms"), 1e3 * seconds).exact(plain("hits", ""), visits.hits as f64 / n);
+    Ok(())
+}
+
+/// Rates of the binary kernel on the device, unless nothing but counts is wanted.
 fn rates(
     session: &BuilderSession,
     flat: &FlatScene,
     stream: &RayStream,
-    contestant: &Contestant,
+    build: &BuildOptions,
 ) -> Result<Option<Percentiles>> {
-    let build = match contestant.builder {
-        Builder::Preset(preset) => BuildOptions { preset: Some(preset), ..Default::default() },
-        // in world space
-        Builder::Heuristic(h) => {
-            let heuristic = Some(h.for_rays(h.rays.relative_to(-flat.origin)));
-            BuildOptions { heuristic, ..Default::default() }
-        }
-    };
-    let tracer = session.device.tracer(flat, TracerKind::Compute, Needs::default(), Kernel::Nearest, &build)?;
+    if session.args.counts {
+        return Ok(None);
+    }
+    let tracer = session.device.tracer(flat, TracerKind::Compute, Needs::default(), Kernel::Nearest, build)?;
     let narrow = |r: &LabRay| Ray {
         origin: r.origin.as_vec3().to_array(),
         tmin: r.tmin as f32,

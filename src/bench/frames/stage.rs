@@ -156,13 +156,8 @@ impl<'a> SceneStage<'a> {
         let (args, camera) = (session.args, &view.camera);
         let signal = Signal::new(args, size, loaded.reach, bounces)?;
         let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(args.reference_paths());
-        let build = BuildOptions {
-            preset: args.build.preset(),
-            heuristic: None,
-            rays,
-            cache: None,
-            streams: signal.streams()?,
-        };
+        let build =
+            BuildOptions { preset: args.build.preset(), rays, streams: signal.streams()?, ..Default::default() };
         let (kind, _) = args.tracer.on(session.device.info());
         let tracer = session.device.tracer(flat, kind, signal.needs()?, ComputeOptions::default(), &build)?;
 

@@ -48,8 +48,7 @@ fn measure_scene(session: &mut FramesSession, source: &str) -> Result<()> {
     let (kind, _) = session.args.tracer.on(session.device.info());
     let [width, height] = session.args.size();
     let rays = u64::from(width) * u64::from(height) * u64::from(session.args.reference_paths());
-    let build =
-        BuildOptions { preset: session.args.build.preset(), heuristic: None, rays, cache: None, streams: Vec::new() };
+    let build = BuildOptions { preset: session.args.build.preset(), rays, ..Default::default() };
     let mut tracer = session.device.tracer(&flat, kind, Needs::default(), ComputeOptions::default(), &build)?;
     let Some(Geometry::Triangles(mesh)) = scene.meshes.get(MESH).map(|m| &m.geometry) else {
         return Err(Error::Scene(format!("{source}: its first mesh has no triangles to deform")));

@@ -82,10 +82,9 @@ impl PathSession<'_> {
         let paths = u64::from(size[0]) * u64::from(size[1]) * 4096;
         let build = BuildOptions {
             preset: args.build.preset(),
-            heuristic: None,
             rays: paths,
-            cache: None,
             streams: path::streams().to_vec(),
+            ..Default::default()
         };
         let needs = Needs { shading: true, ..Default::default() };
         let (kind, _) = args.tracer.on(self.device.info());

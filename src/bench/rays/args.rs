@@ -99,7 +99,7 @@ impl BenchRaysArgs {
         let [width, height] = self.size();
         // a set of rays is traced once more to warm up
         let rays = u64::from(width) * u64::from(height) * (u64::from(self.repeats()) + 1);
-        BuildOptions { preset: self.build.preset(), heuristic: None, rays, cache: None, streams: Vec::new() }
+        BuildOptions { preset: self.build.preset(), rays, ..Default::default() }
     }
 
     /// Timed repeats.

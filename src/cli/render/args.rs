@@ -250,6 +250,7 @@ impl RenderArgs {
         defaults.iter().for_each(|report| plan.reads("a file of defaults", &report.file));
         settings.lighting.environment_file().iter().for_each(|path| plan.reads_images("--environment", path));
         settings.frames.camera_path.iter().for_each(|path| plan.reads("--camera-path", path));
+        self.device.areas_file().iter().for_each(|path| plan.reads("--build-areas", path));
 
         // what is written beside the image
         self.depth_image.iter().for_each(|path| plan.writes("--depth-image", path));

@@ -32,6 +32,8 @@ records! {
         SUSPENDED_WORDS: uint = 20;
         /// `Push.first` of a launch that resumes suspended rays.
         RESUMED: uint = 0xffff_ffff;
+        /// Flag of the first word of a cell of influence areas: it has eight parts.
+        DIVIDED: uint = 0x8000_0000;
     };
 
     /// A node or a leaf of the wide BVH before its kind is known: one cache line, 64 bytes.
@@ -135,6 +137,48 @@ records! {
         unused: uint[5],
         /// Index in the BLAS, with flags.
         number: uint,
+    }
+
+    /// Influence areas that have trees of their own, for the binary kernels.
+    AreasRecord: Block(access: "readonly", align: 16) {
+        /// Lower corner of the octree's root.
+        bounds_min: vec4,
+        /// Upper corner of the octree's root.
+        bounds_max: vec4,
+        /// An `AreaRecord` per area.
+        areas: address,
+        /// Two `uint`s per cell of an octree, the root first: the first of its eight parts, by
+        /// upper halves along x, y and z in bits 0 to 2, with the flag `DIVIDED`; or its first area
+        /// in `members`, and their number. 0: all areas are asked in turn.
+        cells: address,
+        /// A `uint` per area of a cell.
+        members: address,
+        /// A `uint` per primitive of the local trees: the index of its TLAS instance.
+        instances: address,
+        /// Number of areas.
+        count: uint,
+        /// Index of the first primitive of the local trees in `SceneRoot.primitives`.
+        first_primitive: uint,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uvec2,
+    }
+
+    /// An influence area: a convex region, and the rays that start in it and agree with its own.
+    AreaRecord: Array(buffer: "AreaRecords", access: "readonly", align: 16) {
+        /// Faces: outward normal of unit length, and distance from the origin.
+        planes: vec4[6],
+        /// Direction of its rays and 0, or the point that they pass through and 1.
+        rays: vec4,
+        /// Lower corner of the box around it, and the squared cosine of the angle up to which the
+        /// direction of a ray agrees.
+        bounds_min: vec4,
+        /// Upper corner of the box, and the squared distance from the point of its rays within
+        /// which rays of all directions agree.
+        bounds_max: vec4,
+        /// Root of its tree, as in `SceneRoot.root`.
+        root: uint,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uint[3],
     }
 
     /// A closest hit between the steps of a launch. For a miss only `t` is written.

@@ -56,6 +56,10 @@ records! {
         mips: address,
         /// Compute tracer: suspended rays where the driver ends loops early; 0: it does not.
         suspended: address,
+        /// Compute tracer, binary BVH kernel: the `AreasRecord`; 0: no influence area has a tree.
+        areas: address,
+        /// Padding to a multiple of 16 bytes.
+        reserved2: address,
     }
 
     /// A TLAS instance.

@@ -299,7 +299,7 @@ impl<'r> Interactive<'r> {
         };
         // about what a good still traces: the quality of the BVH follows from it
         const RAYS: u64 = 1 << 28;
-        let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
+        let request = TracerRequest { needs, streams, rays: RAYS, camera: None, control, warnings: &mut self.warnings };
         let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;
         self.built += 1;
 

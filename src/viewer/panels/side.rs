@@ -751,6 +751,7 @@ fn device(app: &mut App, ui: &mut Ui) {
                         // options of the compute tracer
                         let d = &mut app.device_settings;
                         (d.traversal, d.triangle_test, d.build, d.bvh_cache) = (None, None, None, None);
+                        (d.build_direction, d.build_eye, d.build_areas) = (None, None, None);
                     }
                 }
             }
