@@ -39,7 +39,7 @@ summaries=$(mktemp)
 trap 'for job in $(jobs -p); do kill -- "-$job" 2>/dev/null || true; done; rm -f "$log"* "$summaries"' EXIT
 
 # keep_summary LABEL: what the log says of a run, for the end
-keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $1: /" >> "$summaries" || true; }
+keep_summary() { grep -E '^ *Summary |^test result:|^[0-9]+ renders?:' "$log" | sed "s/^ */test: $1: /" >> "$summaries" || true; }
 
 # run_alone LABEL OPTION...: tests in processes of their own, those that nextest's options name
 run_alone() {
@@ -53,7 +53,7 @@ run_alone() {
 
 # The processes that run_queue runs: the driver and the binary of each, and the names of its tests, separated by spaces (none: all tests).
 queue=()
-# enqueue DRIVER BINARY [NAME...]: DRIVER is default or floor
+# enqueue DRIVER BINARY [NAME...]: DRIVER is default or floor; BINARY frames are the project's own reference frames
 enqueue() { queue+=("$*"); }
 
 # run_entry DRIVER BINARY [NAME...]: one process, whose tests have one of the NAMEs in theirs; `--skip NAME`: not those
@@ -65,7 +65,11 @@ run_entry() {
     # rounding is the driver's, and fewer rays show what it does
     if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=10000; fi
   fi
-  time cargo test --locked --test="$binary" -- "$@"
+  if [ "$binary" = frames ]; then
+    time "${CARGO_TARGET_DIR:-target}/debug/skylit" verify tests/frames
+  else
+    time cargo test --locked --test="$binary" -- "$@"
+  fi
 }
 
 # run_queue: what was enqueued. What a process prints appears when all have ended.
@@ -73,7 +77,7 @@ run_queue() {
   local entry driver binary names status=0 k=0 binaries=()
   for entry in "${queue[@]}"; do
     read -r driver binary names <<< "$entry"
-    binaries+=("--test=$binary")
+    if [ "$binary" = frames ]; then cargo build --locked --features probes; else binaries+=("--test=$binary"); fi
   done
   cargo test --locked --no-run "${binaries[@]}"
   for entry in "${queue[@]}"; do
@@ -100,16 +104,6 @@ run_queue() {
     k=$((k + 1))
   done
   rm -f "$log".*
-  return "$status"
-}
-
-# run_frames DRIVER [VARIABLE=VALUE...]: the project's own reference frames
-run_frames() {
-  local driver=$1 status=0
-  shift
-  say "reference frames, $driver driver"
-  time env "$@" "${CARGO_TARGET_DIR:-target}/debug/skylit" verify tests/frames 2>&1 | tee "$log" || status=$?
-  grep -E '^[0-9]+ renders?:' "$log" | sed "s/^/test: $driver driver, frames: /" >> "$summaries" || true
   return "$status"
 }
 
@@ -158,9 +152,15 @@ if cargo nextest --version >/dev/null 2>&1; then
   # their floor driver's part is as long as that of the default driver: enqueued next to each other
   for binary in "${shared[@]}"; do
     if [ "$binary$filter" = path ]; then
-      # half of the time of this binary is in these subjects: two processes, since its tests wait for each other
-      enqueue default path bsdf:: cli:: film:: frames:: lag::
-      enqueue default path --skip bsdf:: --skip cli:: --skip film:: --skip frames:: --skip lag::
+      # three processes of about the same time by subjects, since tests of one wait for each other
+      first="cli:: film:: frames:: lag::"
+      second="light_groups:: lit:: materials:: transport:: validation::"
+      # shellcheck disable=SC2086
+      enqueue default path $first
+      # shellcheck disable=SC2086
+      enqueue default path $second
+      # shellcheck disable=SC2046
+      enqueue default path $(printf -- '--skip %s ' $first $second)
     else
       # shellcheck disable=SC2086
       enqueue default "$binary" $filter
@@ -190,14 +190,13 @@ if [ -n "$floor" ]; then
     enqueue floor cli tracers:: program::gpu_
   fi
 fi
+if [ -z "$filter" ]; then
+  enqueue default frames
+  if [ -n "$floor" ]; then enqueue floor frames; fi
+fi
 say "tests that share a device"
 if [ "${#queue[@]}" -gt 0 ]; then run_queue || status=1; fi
-if [ -z "$filter" ]; then
-  cargo build --locked --features probes
-  run_frames default || status=1
-  if [ -n "$floor" ]; then run_frames floor "VK_DRIVER_FILES=$floor" "VK_ICD_FILENAMES=$floor" || status=1; fi
-  run_documentation || status=1
-fi
+if [ -z "$filter" ]; then run_documentation || status=1; fi
 
 if [ -n "$full" ] && [ -z "$filter" ]; then
   say "reports in a browser"

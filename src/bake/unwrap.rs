@@ -103,6 +103,11 @@ pub fn unwrap(
         )));
     }
 
+    // a side that is a few texels short of the size is rounded up, as devices like textures
+    let step = 4.max(page_size / 16);
+    let size = [atlas.width, atlas.height].map(|side| side.next_multiple_of(step).min(page_size));
+    let scale = [0, 1].map(|k| [atlas.width, atlas.height][k] as f32 / size[k] as f32);
+
     // a number that none of the meshes has
     let numbers = sources.iter().flat_map(|(_, p, _)| &p.attributes);
     let numbers = numbers.filter_map(|a| a.name.strip_prefix("TEXCOORD_")?.parse::<u32>().ok());
@@ -110,7 +115,7 @@ pub fn unwrap(
 
     let mut made = Vec::new();
     for ((out, (primitive, source, _)), &mesh) in atlas.meshes.into_iter().zip(&sources).zip(meshes) {
-        let texcoords: Vec<[f32; 2]> = out.vertices.iter().map(|v| v.uv).collect();
+        let texcoords: Vec<[f32; 2]> = out.vertices.iter().map(|v| [v.uv[0] * scale[0], v.uv[1] * scale[1]]).collect();
         let triangles: Vec<[u32; 3]> = out.indices.as_chunks().0.to_vec();
         let count = triangles_of(&scene.meshes[mesh]).map_or(0, |t| t.indices.len());
         let scene_corners = scene_triangles(source, count)
@@ -126,13 +131,7 @@ pub fn unwrap(
             scene_corners,
         });
     }
-    Ok(Unwrapped {
-        size: [atlas.width, atlas.height],
-        texcoord,
-        charts: atlas.chart_count,
-        utilization: atlas.utilization,
-        meshes: made,
-    })
+    Ok(Unwrapped { size, texcoord, charts: atlas.chart_count, utilization: atlas.utilization, meshes: made })
 }
 
 /// Makes the charts on a thread of its own, which `control` may end.

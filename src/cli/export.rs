@@ -51,6 +51,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     files::check_writable(output)?;
     let mut scene = args.load.load(&args.scene, &console)?;
     args.meaning.apply(&mut scene)?;
+    scene.take_out_hidden();
     check_companions(args, plan, &scene, output)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));

@@ -30,6 +30,8 @@ const SKETCH_SIZE: [u32; 2] = [96, 54];
 const SKETCH_SPP: u32 = 8;
 /// Mean radiance of surfaces in a well exposed image.
 const MIDDLE_GREY: f64 = 0.2;
+/// Names of objects and of materials that text shows; `--json` has all.
+const SHOWN_NAMES: usize = 8;
 
 /// `skylit info`.
 #[derive(Clone, Debug, Args)]
@@ -194,6 +196,9 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
 
     // geometry and surfaces
     add("geometry", geometry_text(i));
+    if !i.objects.is_empty() {
+        add("objects", format!("{} (--hide, --only)", first_names(&i.objects)));
+    }
     add("surfaces", surfaces_text(i));
     scene.report.remarks().into_iter().for_each(|remark| add("vertices", remark));
 
@@ -202,7 +207,15 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     let joined = |all: &mut dyn Iterator<Item = (String, usize)>| {
         all.map(|(name, n)| format!("{n} {name}")).collect::<Vec<_>>().join(", ")
     };
-    add("materials", joined(&mut i.materials.iter().map(|(k, n)| (k.clone(), *n))));
+    let kinds = joined(&mut i.materials.iter().map(|(k, n)| (k.clone(), *n)));
+    add(
+        "materials",
+        if i.material_names.is_empty() {
+            kinds
+        } else {
+            format!("{kinds}: {} (--material)", first_names(&i.material_names))
+        },
+    );
     if !i.variants.is_empty() {
         let names = i.variants.iter().map(named).collect::<Vec<_>>().join(", ");
         add("variants", format!("{names} (--variant)"));
@@ -249,6 +262,15 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         add("extensions", extensions.iter().map(noted).collect::<Vec<_>>().join(", "));
     }
     lines
+}
+
+/// The first names of a list, and how many more there are.
+fn first_names(names: &[String]) -> String {
+    let shown = names.iter().take(SHOWN_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(SHOWN_NAMES) {
+        0 => shown,
+        more => format!("{shown}, and {more} more"),
+    }
 }
 
 /// Numbers of primitives, and how they are instanced.

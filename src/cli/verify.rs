@@ -254,6 +254,7 @@ fn total(summary: &Summary) -> String {
     if summary.device.is_empty() {
         format!("{renders}: {parts} (no device was needed)")
     } else {
-        format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds)
+        let pinned = if summary.pinned == Some(false) { ", which is not pinned" } else { "" };
+        format!("{renders}: {parts} (on {}, {}{pinned}, {:.1} s)", summary.device, summary.driver, summary.seconds)
     }
 }

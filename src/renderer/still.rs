@@ -241,6 +241,15 @@ impl<'a> StillRender<'a> {
         job.samples.keep_rays = extras.keep_rays;
         job.samples.film.keep_state = settings.film.keeps_state();
         let fingerprint = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
+        let mut warnings = scene.report.all_warnings();
+        let shows_materials =
+            integrator.capabilities().contains(&Capability::Textures) || !settings.image.aov.is_empty();
+        if !settings.scene.material.is_empty() && !shows_materials {
+            warnings.push(format!(
+                "--material changes nothing that --integrator {} shows: leave it out, or use --integrator path",
+                integrator.name()
+            ));
+        }
         Self {
             renderer,
             completed,
@@ -254,7 +263,7 @@ impl<'a> StillRender<'a> {
             ],
             chosen: completed.options(),
             samples_before: None,
-            warnings: scene.report.all_warnings(),
+            warnings,
         }
     }
 

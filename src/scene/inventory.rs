@@ -1,7 +1,7 @@
 //! Counts of what a scene is made of: for people and programs that look at it before they render
 //! it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ pub struct Inventory {
     pub diagonal: f64,
     /// Instances of meshes.
     pub instances: usize,
+    /// Names of instances, which `--hide` and `--only` take; each once, in the file's order.
+    pub objects: Vec<String>,
     /// Meshes, and those that deform.
     pub meshes: usize,
     /// Meshes with a skin or morph targets.
@@ -37,6 +39,8 @@ pub struct Inventory {
     pub closed_meshes: usize,
     /// Materials that instances use, by model and what it is extended by.
     pub materials: BTreeMap<String, usize>,
+    /// Names of these materials, which `--material` takes; each once, in the file's order.
+    pub material_names: Vec<String>,
     /// Names of variants of the materials, of which `--variant` chooses one.
     pub variants: Vec<String>,
     /// Textures.
@@ -94,6 +98,7 @@ impl Inventory {
             bounds: bounds.map(|(lo, hi)| [lo.to_array(), hi.to_array()]),
             diagonal: bounds.map_or(0.0, |(lo, hi)| (hi - lo).length()),
             instances: scene.instances.len(),
+            objects: distinct(scene.instances.iter().map(|i| i.name.as_str())),
             meshes: scene.meshes.len(),
             deforming_meshes: deformations.len(),
             unique_triangles: of_mesh.iter().map(|m| m.0).sum(),
@@ -103,6 +108,7 @@ impl Inventory {
             open_edges: of_mesh.iter().map(|m| m.1).sum(),
             closed_meshes: of_mesh.iter().filter(|m| m.0 > 0 && m.1 == 0).count(),
             materials,
+            material_names: distinct(used.iter().map(|k| scene.materials[*k].name.as_str())),
             variants: scene.variants.clone(),
             textures: textures(scene),
             cameras: scene.cameras.iter().map(|c| c.name.clone()).collect(),
@@ -117,6 +123,12 @@ impl Inventory {
             morph_targets: deformations.iter().map(|d| d.targets.len()).sum(),
         }
     }
+}
+
+/// Names in their order, each once, without empty ones.
+fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut seen = HashSet::new();
+    names.filter(|name| !name.is_empty() && seen.insert(*name)).map(str::to_owned).collect()
 }
 
 /// Edges of one triangle only, where vertices at the same place are one.
@@ -217,6 +229,7 @@ mod tests {
         assert!(cornell.materials.keys().any(|m| m.contains("emission")), "{:?}", cornell.materials);
         let grid = inventory("grid:4");
         assert!(grid.triangles > 4 * grid.unique_triangles && grid.instances > 4, "{grid:?}");
+        assert_eq!(distinct(["a", "", "b", "a", "c", "b"].into_iter()), ["a", "b", "c"]);
         let spheres = inventory("spheres:50");
         assert!(spheres.spheres > 0);
         let parade = inventory("parade");

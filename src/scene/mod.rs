@@ -26,6 +26,7 @@ pub mod motion;
 pub mod orbit;
 pub mod settings;
 pub mod sky;
+mod take_out;
 pub mod texture;
 
 pub use animation::AnimationRig;

@@ -91,7 +91,8 @@ mod tests {
             result("c", Outcome::Failed("no golden image".into())),
             result("d", Outcome::Skipped("no tracer".into())),
         ];
-        let summary = Summary { device: "llvmpipe".into(), driver: "Mesa 25".into(), frames, seconds: 1.5 };
+        let summary =
+            Summary { device: "llvmpipe".into(), driver: "Mesa 25".into(), pinned: None, frames, seconds: 1.5 };
         let xml = text(&summary, "tests/frames").unwrap();
         for part in [
             r#"tests="4""#,

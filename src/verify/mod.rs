@@ -97,6 +97,9 @@ pub struct FrameResult {
 pub struct Summary {
     pub device: String,
     pub driver: String,
+    /// Whether the manifest names the driver among those that golden images are made on; `None`
+    /// where it names none.
+    pub pinned: Option<bool>,
     /// Results in the order in which frames were rendered.
     pub frames: Vec<FrameResult>,
     pub seconds: f64,
@@ -122,7 +125,7 @@ impl Summary {
     /// The results of a run that ended before frames could be judged.
     pub fn of_failure(why: &str) -> Self {
         let result = FrameResult::new(manifest::NAME, None, Outcome::Failed(why.to_owned()).into(), 0.0);
-        Self { device: String::new(), driver: String::new(), frames: vec![result], seconds: 0.0 }
+        Self { device: String::new(), driver: String::new(), pinned: None, frames: vec![result], seconds: 0.0 }
     }
 
     /// Number of results for which `is` is true.
@@ -192,7 +195,8 @@ pub fn run(
     // a device is for frames that can be rendered
     if frames.is_empty() {
         let (device, driver) = (String::new(), String::new());
-        return Ok(Summary { device, driver, frames: results, seconds: start.elapsed().as_secs_f64() });
+        let seconds = start.elapsed().as_secs_f64();
+        return Ok(Summary { device, driver, pinned: None, frames: results, seconds });
     }
     let mut session = VerifySession::open(manifest, device)?;
     if let Action::Bless { missing, force } = options.action {
@@ -229,6 +233,7 @@ pub fn run(
     Ok(Summary {
         device: info.name.clone(),
         driver: info.driver.clone(),
+        pinned: (!manifest.pinned.is_empty()).then(|| manifest::names_driver(&manifest.pinned, &info.driver)),
         frames: results,
         seconds: start.elapsed().as_secs_f64(),
     })

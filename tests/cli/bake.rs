@@ -195,6 +195,8 @@ fn other_formats_become_gltf_and_images_have_a_file_each() {
     let glb = place(&dir, "box.glb");
     let record = bakes(&["builtin:cornell-box", "-o", &glb, "--size", "64", "--spp", "4", "--ao-radius", "1"]);
     assert!(record["textures"].as_array().unwrap().iter().all(|t| t["unwrapped"] == true));
+    let sides = record["textures"].as_array().unwrap().iter().flat_map(|t| t["size"].as_array().unwrap());
+    assert!(sides.map(|side| side.as_u64().unwrap()).all(|side| side <= 64 && side % 4 == 0), "{record}");
     let scene = load(&glb).unwrap();
     assert!(scene.materials.iter().all(|m| m.occlusion_texture.is_some()));
 

@@ -229,11 +229,15 @@ fn gpu_refusals_leave_the_rest() {
     let place = Place::new("");
     let args =
         ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
-    let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
+    let record = json(&place.run(&[&args[..], &["wide,nearest,brute", "--json"]].concat()));
     assert_eq!(record["settings"]["build"], "fast");
     let notes = record["notes"].to_string();
     assert!(notes.contains("'brute' left out: traversal 'brute' tests every primitive"), "{notes}");
-    assert_eq!(contestants(&record, "builtin:grid:8", "primary"), ["wide"]);
+    assert_eq!(contestants(&record, "builtin:grid:8", "primary"), ["wide", "nearest"]);
+    // without a peer ratios are to the first
+    let of = |kernel: &str, quantity: &str| value(&record, ["builtin:grid:8", "primary", kernel, quantity]);
+    assert_eq!(of("wide", "x wide"), 1.0);
+    assert!((of("nearest", "x wide") / (of("nearest", "rate") / of("wide", "rate")) - 1.0).abs() < 1e-9);
     fails(&place.run(&[&args[..], &["brute"]].concat()), 3, &["traversal 'brute' tests every primitive"]);
 }
 

@@ -15,6 +15,18 @@ fn files_are_described_without_a_device() {
     assert_eq!((record["format"].as_str(), record["unit"].as_str()), (Some("glTF 2.0, binary"), Some("metre")));
     assert!(!record["inventory"]["animations"].as_array().unwrap().is_empty(), "{record}");
     assert!(record["device"].is_null() && record["suggestions"].is_null());
+    // the names are those that options take
+    let names = |key: &str| -> Vec<&str> {
+        record["inventory"][key].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect()
+    };
+    let (object, material) = (names("objects")[0], names("material_names")[0]);
+    let edit = format!("{material} roughness=0.5");
+    let args = ["info", "scenes/parade.glb", "--no-device", "--only", object, "--material", &edit];
+    let text = String::from_utf8(run(&args).stdout).unwrap();
+    for name in [object, material] {
+        assert!(text.contains(name), "{name}: {text}");
+    }
+    assert!(text.contains(" (--hide, --only)") && text.contains(" (--material)"), "{text}");
     refuses(&["info", "nowhere.glb"], 3, "nowhere.glb");
     refuses(&["info", "builtin:nothing"], 64, "no built-in scene");
 }

@@ -323,6 +323,37 @@ fn warnings_are_in_the_record() {
     }
 }
 
+/// What is left out of an export leaves nothing behind, and is not counted.
+#[test]
+fn objects_that_are_left_out_are_not_exported() {
+    let dir = tempfile::tempdir().unwrap();
+    let (all, part) = (dir.path().join("all.glb"), dir.path().join("part.glb"));
+    let whole = json(&run(&["export", "scenes/courtyard.gltf", path(&all), "--json"]));
+    let beam = json(&run(&["export", "scenes/courtyard.gltf", path(&part), "--only", "beam left", "--json"]));
+    let count = |record: &Value, key: &str| record[key].as_u64().unwrap();
+    assert_eq!(count(&beam, "triangles"), count(&beam, "triangles_written"));
+    assert!(count(&whole, "triangles") > 5 * count(&beam, "triangles"), "{whole} {beam}");
+    let size = |file: &std::path::Path| std::fs::metadata(file).unwrap().len();
+    assert!(size(&all) > 2 * size(&part), "{} {}", size(&all), size(&part));
+}
+
+/// An edit that the image does not show is said to have no effect.
+#[test]
+fn gpu_edits_that_are_not_shown() {
+    if !run(&["doctor"]).status.success() {
+        assert!(std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("a.exr");
+    let args = ["render", "scenes/courtyard.gltf", "-o", path(&image), "--size", "16x9", "--spp", "1", "--json"];
+    let warned = |more: &[&str]| {
+        let record = json(&run(&[&args[..], &["--material", "plaster roughness=0.1"], more].concat()));
+        record["warnings"].to_string().contains("--material changes nothing that --integrator ao shows")
+    };
+    assert!(warned(&[]) && !warned(&["--integrator", "albedo"]) && !warned(&["--aov", "albedo"]));
+}
+
 /// What pictures of frames show, and what is beside it in .exr files.
 #[test]
 fn gpu_frames_as_pictures() {

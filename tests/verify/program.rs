@@ -241,6 +241,15 @@ fn gpu_golden_images_are_made_and_compared() {
     assert!(out.status.success(), "{}", stderr(&out));
     let lines = String::from_utf8(out.stdout).unwrap();
     assert!(lines.starts_with("holds    plane") && lines.contains("2 renders: 2 hold (on "), "{lines}");
+    assert!(all["pinned"] == true && !lines.contains("not pinned"), "{lines}");
+    let here = std::fs::read_to_string(path.join("frames.toml")).unwrap();
+    pin("a driver of the past");
+    let elsewhere = String::from_utf8(verify(&["--filter", "plane"]).stdout).unwrap();
+    assert!(
+        elsewhere.contains("1 render: 1 hold (on ") && elsewhere.contains(", which is not pinned, "),
+        "{elsewhere}"
+    );
+    std::fs::write(path.join("frames.toml"), here).unwrap();
 
     // the same again is the same; other settings are not
     let again = json(&verify(&["--bless", "--json"]));

@@ -49,7 +49,7 @@ const MAX_VISITED_PRIMITIVES: usize = 2_000_000;
 struct Findings {
     checks: Vec<Check>,
     edges: Vec<EdgeCounts>,
-    /// Contestants that ratios are given to.
+    /// Contestants that ratios are given to, if they run.
     baselines: Vec<String>,
 }
 
@@ -211,6 +211,12 @@ impl RaySession<'_> {
             let some: Vec<Ray> = rays.iter().step_by(rays.len().div_ceil(VISITED_RAYS).max(1)).copied().collect();
             let visits = counter.as_ref().map(|c| c.mean(&some, stream.mode == Mode::Any));
             let size = (loaded.scene.triangle_count() + loaded.scene.sphere_count()) as f64;
+            // ratios are to each baseline that ran, or else to the first contestant
+            let is_named = |run: &&StreamRun| findings.baselines.contains(&run.name);
+            let mut bases: Vec<&StreamRun> = runs.iter().filter(is_named).collect();
+            if bases.is_empty() && runs.len() > 1 {
+                bases.extend(runs.first());
+            }
             for run in &runs {
                 let mut row = self.record.row(source, stream.name, &run.name).of_peer(run.is_peers);
                 let mut row = row.at(SIZE, size);
@@ -220,8 +226,8 @@ impl RaySession<'_> {
                 row.repeated(quantity::RATE, rates(&run.seconds));
                 row.repeated(plain("wall rate", "Mrays/s"), run.wall_seconds.as_deref().and_then(rates));
                 row.exact(plain("traced", "rays"), run.rays).exact(plain("hit share", ""), run.hit_share);
-                // ratios round by round, to each baseline that ran
-                for base in runs.iter().filter(|base| findings.baselines.contains(&base.name)) {
+                // round by round
+                for base in &bases {
                     let ratio = paired_ratio(&run.seconds, run.rays, &base.seconds, base.rays);
                     row.exact(plain(&format!("x {}", base.name), ""), ratio);
                 }

@@ -3,6 +3,7 @@
 
 mod object;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::value::RawValue;
@@ -27,12 +28,22 @@ const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"
 pub struct AmendedFile {
     source: SourceFile,
     root: Object,
+    /// Lists of the document that were looked at, by their names.
+    lists: BTreeMap<&'static str, List>,
+    /// Whether a primitive that Draco packed was written anew.
+    unpacks_draco: bool,
     /// Bytes of added buffer views, each from a multiple of 4.
     bytes: Vec<u8>,
     /// Added buffer views.
     views: Vec<AddedView>,
     /// Added images: name and PNG file.
     images: Vec<(String, Vec<u8>)>,
+}
+
+/// A list of the document, which is read once.
+struct List {
+    values: Vec<Box<RawValue>>,
+    has_changed: bool,
 }
 
 /// A buffer view that is added.
@@ -64,7 +75,8 @@ impl AmendedFile {
     pub fn open(path: &Path) -> Result<Self> {
         let source = SourceFile::open(path)?;
         let root = Object::parse(source.json()).map_err(|e| Error::input(path, format!("is not valid JSON: {e}")))?;
-        Ok(Self { source, root, bytes: Vec::new(), views: Vec::new(), images: Vec::new() })
+        let (bytes, views, images) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { source, root, lists: BTreeMap::new(), unpacks_draco: false, bytes, views, images })
     }
 
     /// The file as it was read.
@@ -72,39 +84,52 @@ impl AmendedFile {
         &self.source
     }
 
+    /// A list of the file, empty where there is none.
+    fn list(&mut self, name: &'static str) -> &mut List {
+        let root = &self.root;
+        self.lists.entry(name).or_insert_with(|| List { values: root.list(name), has_changed: false })
+    }
+
+    /// Puts the lists that have changed into the document.
+    fn write_lists(&mut self) {
+        for (name, list) in std::mem::take(&mut self.lists) {
+            if list.has_changed {
+                self.root.set(name, &list.values);
+            }
+        }
+    }
+
     /// Appends a value to a list of the file, which is made where there is none; returns its index.
-    fn push(&mut self, list: &str, value: &Value) -> usize {
-        let mut values = self.root.list(list);
-        values.push(object::raw(value));
-        self.root.set(list, &values);
-        values.len() - 1
+    fn push(&mut self, list: &'static str, value: &Value) -> usize {
+        let list = self.list(list);
+        list.values.push(object::raw(value));
+        list.has_changed = true;
+        list.values.len() - 1
     }
 
     /// Changes an element of a list of the file.
-    fn change(&mut self, list: &str, index: usize, change: impl FnOnce(&mut Object)) -> Result<()> {
-        let mut values = self.root.list(list);
-        let parsed = values.get(index).and_then(|value| Object::parse(value.get().as_bytes()).ok());
+    fn change(&mut self, name: &'static str, index: usize, change: impl FnOnce(&mut Object)) -> Result<()> {
+        let list = self.list(name);
+        let parsed = list.values.get(index).and_then(|value| Object::parse(value.get().as_bytes()).ok());
         let Some(mut element) = parsed else {
-            return Err(Error::input(self.source.path(), format!("{list} has no element {index}")));
+            return Err(Error::input(self.source.path(), format!("{name} has no element {index}")));
         };
         change(&mut element);
-        values[index] = object::raw(&element);
-        self.root.set(list, &values);
+        list.values[index] = object::raw(&element);
+        list.has_changed = true;
         Ok(())
     }
 
     /// Changes all elements of a list of the file.
-    fn change_each(&mut self, list: &str, mut change: impl FnMut(&mut Object)) {
-        let mut values = self.root.list(list);
-        for value in &mut values {
+    fn change_each(&mut self, list: &'static str, mut change: impl FnMut(&mut Object)) {
+        let list = self.list(list);
+        for value in &mut list.values {
             if let Ok(mut element) = Object::parse(value.get().as_bytes()) {
                 change(&mut element);
                 *value = object::raw(&element);
             }
         }
-        if !values.is_empty() {
-            self.root.set(list, &values);
-        }
+        list.has_changed |= !list.values.is_empty();
     }
 
     /// Adds a buffer view of these bytes; returns its index.
@@ -112,7 +137,7 @@ impl AmendedFile {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         self.views.push(AddedView { offset: self.bytes.len(), length: bytes.len(), target, stride });
         self.bytes.extend_from_slice(bytes);
-        self.root.list("bufferViews").len() + self.views.len() - 1
+        self.list("bufferViews").values.len() + self.views.len() - 1
     }
 
     /// Adds a texture of a PNG file, which is called `name` where it is a file of its own; returns
@@ -131,7 +156,7 @@ impl AmendedFile {
             }),
         );
         // where its bytes lie is known when the file is saved
-        let source = self.root.list("images").len() + self.images.len();
+        let source = self.list("images").values.len() + self.images.len();
         self.images.push((name.to_owned(), png));
         self.push("textures", &json!({ "name": name, "source": source, "sampler": sampler }))
     }
@@ -245,9 +270,7 @@ impl AmendedFile {
                 p.remove("extensions");
             }
         })?;
-        if source.is_draco {
-            self.forget_draco();
-        }
+        self.unpacks_draco |= source.is_draco;
         Ok(())
     }
 
@@ -299,7 +322,11 @@ impl AmendedFile {
     /// # Errors
     /// [`Error::Output`], also for a `.gltf` of a `.glb`; [`Error::Input`] for images that cannot
     /// be read.
-    pub fn save(self, path: &Path) -> Result<Vec<PathBuf>> {
+    pub fn save(mut self, path: &Path) -> Result<Vec<PathBuf>> {
+        self.write_lists();
+        if self.unpacks_draco {
+            self.forget_draco();
+        }
         if files::has_extension(path, "glb") { self.save_binary(path) } else { self.save_text(path) }
     }
 
@@ -321,7 +348,7 @@ impl AmendedFile {
         self.embed_images()?;
 
         // buffers that have bytes become one, in whose place the others count on
-        let buffers = self.root.list("buffers");
+        let buffers = self.list("buffers").values.clone();
         let mut places = Vec::new();
         let (mut base, mut others) = (0usize, Vec::new());
         for (i, bytes) in self.source.buffers().enumerate() {
@@ -351,10 +378,11 @@ impl AmendedFile {
             joined.set("byteLength", &total);
             let kept = others.iter().filter_map(|&i| buffers.get(i).cloned());
             let all: Vec<Box<RawValue>> = std::iter::once(object::raw(&joined)).chain(kept).collect();
-            self.root.set("buffers", &all);
+            *self.list("buffers") = List { values: all, has_changed: true };
         }
 
         // the bytes, each buffer padded
+        self.write_lists();
         let mut parts: Vec<&[u8]> = Vec::new();
         for bytes in self.source.buffers().flatten() {
             parts.push(bytes);
@@ -384,8 +412,8 @@ impl AmendedFile {
 
     /// Makes buffer views of all images, those of the file that are elsewhere and the added ones.
     fn embed_images(&mut self) -> Result<()> {
-        for index in 0..self.root.list("images").len() {
-            let image = &self.root.list("images")[index];
+        for index in 0..self.list("images").values.len() {
+            let image = &self.list("images").values[index];
             let uri: Option<String> = Object::parse(image.get().as_bytes())
                 .ok()
                 .and_then(|image| serde_json::from_str(image.get("uri")?.get()).ok());
@@ -429,6 +457,7 @@ impl AmendedFile {
             self.list_views(buffer, 0);
             written.push(file);
         }
+        self.write_lists();
         write_buffered(path, |out| out.write_all(object::raw(&self.root).get().as_bytes()))?;
         written.push(path.to_owned());
         Ok(written)
