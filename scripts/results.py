@@ -200,8 +200,9 @@ def draw(page: str, data: Record, program: str) -> None:
         file, image = Path(temporary) / "record.json", PAGES / f"{page}.svg"
         file.write_text(json.dumps(data["record"]))
         subprocess.run([program, "bench", "report", file, "--plot", image, "-q"], stdout=subprocess.DEVNULL, check=True)
-        # coordinates to a hundredth of a pixel
-        image.write_text(re.sub(r"(\d+\.\d\d)\d+", r"\1", image.read_text()))
+        # coordinates to a hundredth of a pixel, and texts as they are
+        tag = re.compile(r"<[^<>]*>")
+        image.write_text(tag.sub(lambda t: re.sub(r"(\d+\.\d\d)\d+", r"\1", t[0]), image.read_text()))
 
 
 def measure(arguments: argparse.Namespace) -> int:
