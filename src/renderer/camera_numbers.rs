@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::settings::CameraSettings;
 use crate::output::exr::{WORLD_TO_CAMERA, WORLD_TO_NDC, matrix_text};
+use crate::scene::camera::ViewHeight;
 use crate::scene::{Camera, ClipPlanes, Projection};
 
 /// Metadata key of [`pose`].
@@ -32,15 +33,20 @@ pub fn pose(camera: &Camera) -> Value {
     pose
 }
 
-/// The settings of the perspective camera of a [`pose`] in metadata; `None` if it is none.
+/// The settings of the camera of a [`pose`] in metadata; `None` if it is none.
 pub fn settings(pose: &str) -> Option<CameraSettings> {
     let pose: Value = serde_json::from_str(pose).ok()?;
     let vector = |key: &str| serde_json::from_value(pose[key].clone()).ok().map(DVec3::from_array);
+    let (fov_y, half_height) = (pose["fov_y"].as_f64(), pose["half_height"].as_f64());
+    if fov_y.is_none() && half_height.is_none() {
+        return None;
+    }
     Some(CameraSettings {
         eye: Some(vector("eye")?),
         target: Some(vector("target")?),
         up: Some(vector("up")?),
-        fov_y: Some(pose["fov_y"].as_f64()?),
+        fov_y,
+        orthographic: half_height.map(|half| ViewHeight::Units(2.0 * half)),
         clip: serde_json::from_value(pose["clip"].clone()).ok(),
         ..CameraSettings::default()
     })

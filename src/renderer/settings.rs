@@ -23,6 +23,7 @@ use crate::output::tone_map::ToneMap;
 #[cfg(feature = "cli")]
 use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
+use crate::scene::camera::ViewHeight;
 use crate::scene::{Camera, ClipPlanes, Projection, Scene, SceneSettings};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
@@ -92,12 +93,23 @@ settings! {
             option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL);
         /// Vertical field of view in degrees [default: the camera's, or 45]
         fov_y: Option<f64>, option(value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
+        /// Parallel rays instead of perspective: HEIGHT of the view in scene units, or `fit`
+        ///
+        /// `fit` shows all of a scene that is seen from outside; else it shows as much as the
+        /// camera's field of view does of what it looks at. Rays start at the camera.
+        orthographic: Option<ViewHeight>, option(value_name = "HEIGHT|fit", conflicts_with = "fov_y"), applies(AppliesTo::ALL);
         /// Clipping planes, in scene units; FAR may be `inf` [default: those of the camera, or
         /// none]
         ///
         /// The camera sees what lies between these distances along the view direction. `none` clips
         /// nothing.
         clip: Option<ClipPlanes>, option(value_name = "NEAR,FAR"), applies(AppliesTo::ALL);
+    }
+}
+
+impl crate::settings::Editable for Option<ViewHeight> {
+    fn value(&mut self) -> crate::settings::Value<'_> {
+        crate::settings::Value::Other
     }
 }
 
@@ -131,6 +143,11 @@ impl CameraSettings {
         if self.eye.is_some() && self.eye == self.target {
             return Err(Error::Usage("--eye and --target are the same point: move one of them".into()));
         }
+        if self.fov_y.is_some() && self.orthographic.is_some() {
+            return Err(Error::Usage(
+                "--orthographic: a view of parallel rays has no field of view: leave out --fov-y".into(),
+            ));
+        }
         if self.up == Some(DVec3::ZERO) {
             return Err(Error::Usage("--up 0,0,0 has no direction: give a vector of another length than 0".into()));
         }
@@ -145,11 +162,15 @@ impl CameraSettings {
     pub fn automatic(&self, survey: &Survey, aspect: f64) -> Result<Option<ChosenCamera>> {
         let fov_y = self.fov_y.map(f64::to_radians);
         let is_automatic = self.eye.is_none() && self.camera.is_none() && survey.scene().cameras.is_empty();
-        match self.view {
-            Some(name) => framing::named(survey, name, aspect, fov_y).map(Some),
-            None if is_automatic => framing::choose_on_host(survey, aspect, fov_y).map(Some),
-            None => Ok(None),
-        }
+        let chosen = match self.view {
+            Some(name) => framing::named(survey, name, aspect, fov_y)?,
+            None if is_automatic => framing::choose_on_host(survey, aspect, fov_y)?,
+            None => return Ok(None),
+        };
+        Ok(Some(match self.orthographic {
+            Some(height) => chosen.orthographic(height, survey, aspect)?,
+            None => chosen,
+        }))
     }
 
     /// The scene's camera that they choose, if it is one.
@@ -195,6 +216,15 @@ impl CameraSettings {
                     return Err(Error::Usage("--fov-y: the camera is orthographic and has no field of view".into()));
                 }
             }
+        }
+        if let Some(height) = self.orthographic {
+            let eye = camera.camera_to_world.translation;
+            let half_height = match (height, self.target) {
+                (ViewHeight::Units(height), _) => 0.5 * height,
+                (ViewHeight::Fit, Some(target)) => camera.half_height_at(target.distance(eye)),
+                (ViewHeight::Fit, None) => camera.half_height_at(framing::distance_ahead(&camera, survey.bounds()?)),
+            };
+            camera.projection = Projection::Orthographic { half_height };
         }
         Ok(camera)
     }
@@ -455,14 +485,21 @@ impl RenderSettings {
         let mut out = self.clone();
         let (camera, motion) = (&other.camera, &other.frames);
         if camera.chooses() {
-            out.camera = CameraSettings { fov_y: out.camera.fov_y, ..Default::default() };
+            let CameraSettings { fov_y, orthographic, .. } = out.camera;
+            out.camera = CameraSettings { fov_y, orthographic, ..Default::default() };
         }
         match (other.image.spp, other.film.quality) {
             (Some(_), _) => out.film.quality = None,
             (_, Some(_)) => (out.image.spp, out.film.target_rmse) = (None, None),
             (None, None) => {}
         }
-        if camera.chooses() || camera.fov_y.is_some() {
+        // a view is of one kind
+        match (camera.fov_y, camera.orthographic) {
+            (Some(_), _) => out.camera.orthographic = None,
+            (None, Some(_)) => out.camera.fov_y = None,
+            (None, None) => {}
+        }
+        if camera.chooses() || camera.fov_y.is_some() || camera.orthographic.is_some() {
             out.frames.camera_path = None;
         }
         if motion.camera_path.is_some() {
@@ -720,6 +757,12 @@ mod tests {
         let settings = parse(&given);
         assert_eq!(parse(&settings.flags()), settings, "{:?}", settings.flags());
         assert!(RenderSettings::default().flags().is_empty());
+        for height in ["fit", "2.5"] {
+            let view = RenderSettings::from_words(&format!("ao --view top --orthographic {height}")).unwrap();
+            assert_eq!(parse(&view.flags()), view, "{:?}", view.flags());
+            let text = serde_json::to_string(&view).unwrap();
+            assert_eq!(serde_json::from_str::<RenderSettings>(&text).unwrap(), view, "{text}");
+        }
         // a file, and options that replace what it says
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let other = parse(&words("--camera 1 --spp 9 --integrator direct"));

@@ -71,6 +71,62 @@ impl<'de> serde::Deserialize<'de> for ClipPlanes {
     }
 }
 
+/// How much an orthographic view shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ViewHeight {
+    /// As much as the perspective view in its place shows of what it looks at.
+    Fit,
+    /// Height of the view, scene units, above 0.
+    Units(f64),
+}
+
+/// `fit`, or a height above 0.
+impl FromStr for ViewHeight {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.trim() == "fit" {
+            return Ok(Self::Fit);
+        }
+        let height = text.trim().parse().ok().filter(|h: &f64| *h > 0.0 && h.is_finite());
+        height.map(Self::Units).ok_or_else(|| "expected a height in scene units above 0, or `fit`".to_owned())
+    }
+}
+
+impl fmt::Display for ViewHeight {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Fit => f.write_str("fit"),
+            Self::Units(height) => write!(f, "{height}"),
+        }
+    }
+}
+
+impl serde::Serialize for ViewHeight {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Fit => serializer.collect_str(self),
+            Self::Units(height) => serializer.serialize_f64(*height),
+        }
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for ViewHeight {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(serde::Deserialize)]
+        #[serde(untagged)]
+        enum Written {
+            Number(f64),
+            Text(String),
+        }
+        let text = match Written::deserialize(deserializer)? {
+            Written::Number(height) => height.to_string(),
+            Written::Text(text) => text,
+        };
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
 /// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
@@ -102,6 +158,14 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Half the height of what it shows in a plane across its view at a distance, scene units.
+    pub fn half_height_at(&self, distance: f64) -> f64 {
+        match self.projection {
+            Projection::Perspective { fov_y } => distance * (0.5 * fov_y).tan(),
+            Projection::Orthographic { half_height } => half_height,
+        }
+    }
+
     /// A perspective camera at `eye` looking at `target`. `up` need not be perpendicular; when it
     /// is parallel to the view direction another one is chosen. `fov_y` in radians.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Self {

@@ -34,10 +34,10 @@ use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
 use crate::renderer::settings::{CameraSettings, ImageSettings};
 use crate::renderer::survey::rays::camera_ray;
+use crate::scene::Camera;
 use crate::scene::load::{GeometryOptions, LoadOptions};
 use crate::scene::material_edit::MaterialEdit;
 use crate::scene::settings::variant_index;
-use crate::scene::{Camera, Projection};
 use crate::settings::{Capability, Length};
 use crate::tracer::DeviceSettings;
 
@@ -1186,25 +1186,18 @@ impl App {
     /// samples of a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a camera that options cannot say, and before there is one.
+    /// [`Error::Usage`] before there is a camera.
     pub fn render_settings(&self, motion: RenderedMotion) -> Result<RenderSettings> {
         let none = || Error::Usage("there is no image to render yet".into());
         let (scene, control) = self.scene.as_ref().zip(self.control.as_ref()).ok_or_else(none)?;
         let mut settings = self.shown_settings();
         let is_still = settings.realtime_setting().is_none();
         let camera = control.camera();
-        let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
         settings.camera = match (self.playback.animation, self.followed) {
             // by its index an animation would move it
-            (Some(_), None) if !is_orthographic => camera_placement(camera),
+            (Some(_), None) => camera_placement(camera),
             _ => camera_settings(&scene.cameras, camera),
         };
-        if settings.camera.camera.is_none() && is_orthographic {
-            return Err(Error::Usage(
-                "an orthographic camera that has been moved cannot be given to `skylit render`: choose one of the file, or F"
-                    .into(),
-            ));
-        }
 
         // samples of a still, and the moment
         if is_still {

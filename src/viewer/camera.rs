@@ -9,6 +9,9 @@ const TURN: f64 = 0.006;
 /// Closest that the view direction comes to the vertical, radians.
 const POLE: f64 = 1e-3;
 
+/// Vertical field of view after parallel rays, radians.
+const FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
+
 /// A camera that a user moves: its position, and a pivot in front of it around which it orbits.
 /// World up is +y.
 #[derive(Clone, Debug)]
@@ -106,11 +109,7 @@ impl CameraControl {
     /// Moves sideways and up, so that the pivot follows a drag of so many points in a view of
     /// `height` points.
     pub fn pan(&mut self, dx: f64, dy: f64, height: f64) {
-        let visible = match self.camera.projection {
-            Projection::Perspective { fov_y } => 2.0 * self.distance * (0.5 * fov_y).tan(),
-            Projection::Orthographic { half_height } => 2.0 * half_height,
-        };
-        let unit = visible / height.max(1.0);
+        let unit = 2.0 * self.camera.half_height_at(self.distance) / height.max(1.0);
         let m = self.camera.camera_to_world.matrix3;
         self.shift((m.y_axis * dy - m.x_axis * dx) * unit);
     }
@@ -146,10 +145,7 @@ impl CameraControl {
     /// the pivot. `at`: the pointer from the middle of the image, right and up, in halves of its
     /// height.
     pub fn zoom_at(&mut self, factor: f64, at: [f64; 2]) {
-        let half_height = |c: &Self| match c.camera.projection {
-            Projection::Perspective { fov_y } => c.distance * (0.5 * fov_y).tan(),
-            Projection::Orthographic { half_height } => half_height,
-        };
+        let half_height = |c: &Self| c.camera.half_height_at(c.distance);
         let before = half_height(self);
         self.zoom(factor);
         let m = self.camera.camera_to_world.matrix3;
@@ -207,6 +203,9 @@ impl CameraControl {
         }
         let camera = Camera::look_at(self.eye() + offset * 0.5, point, DVec3::Y, 1.0);
         self.camera.camera_to_world = camera.camera_to_world;
+        if let Projection::Orthographic { half_height } = &mut self.camera.projection {
+            *half_height *= 0.5;
+        }
         self.become_free();
         self.distance = 0.5 * distance;
     }
@@ -218,6 +217,32 @@ impl CameraControl {
         let m = &mut self.camera.camera_to_world;
         *m = DAffine3::from_mat3_translation(turned * m.matrix3, pivot + turned * (m.translation - pivot));
         self.become_free();
+    }
+
+    /// Changes between perspective and parallel rays; what is at the pivot keeps its size.
+    pub fn set_orthographic(&mut self, is_orthographic: bool) {
+        let half_height = self.camera.half_height_at(self.distance);
+        match self.camera.projection {
+            Projection::Perspective { .. } if is_orthographic => {
+                self.camera.projection = Projection::Orthographic { half_height };
+            }
+            Projection::Orthographic { .. } if !is_orthographic => {
+                let (pivot, fov_y) = (self.pivot(), FOV_Y);
+                self.camera.projection = Projection::Perspective { fov_y };
+                self.distance = half_height / (0.5 * fov_y).tan();
+                self.camera.camera_to_world.translation = pivot - self.forward() * self.distance;
+            }
+            _ => return,
+        }
+        self.become_free();
+    }
+
+    /// Sets the height of a view of parallel rays, scene units; without effect on others.
+    pub fn set_height(&mut self, height: f64) {
+        if let Projection::Orthographic { half_height } = &mut self.camera.projection {
+            *half_height = 0.5 * height;
+            self.become_free();
+        }
     }
 
     /// Sets the vertical field of view, radians; without effect on orthographic cameras.
@@ -306,6 +331,21 @@ mod tests {
         // beyond the pole it stops
         c.orbit(0.0, 1e5);
         assert!(is_rigid(c.camera()) && c.forward().y.abs() < 1.0);
+    }
+
+    #[test]
+    fn parallel_rays_show_what_is_at_the_pivot_as_large() {
+        let mut c = control();
+        let (pivot, height) = (c.pivot(), 10.0 * 0.4f64.tan());
+        c.set_orthographic(true);
+        assert_eq!(c.camera().projection, Projection::Orthographic { half_height: 0.5 * height });
+        c.zoom(0.5);
+        c.set_height(3.0);
+        c.set_orthographic(true);
+        assert_eq!(c.camera().half_height_at(7.0), 1.5);
+        c.set_orthographic(false);
+        assert!((c.camera().half_height_at(c.distance) - 1.5).abs() < 1e-12 && (c.pivot() - pivot).length() < 1e-9);
+        assert!(is_rigid(c.camera()));
     }
 
     #[test]

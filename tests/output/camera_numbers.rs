@@ -3,6 +3,7 @@
 use glam::{DVec3, DVec4};
 use serde_json::{Value, json};
 use skylit::renderer::camera_numbers::{matrices, metadata, settings};
+use skylit::scene::camera::ViewHeight;
 use skylit::scene::{Camera, Projection};
 
 #[test]
@@ -22,6 +23,9 @@ fn matrices_project_points() {
     camera.projection = Projection::Orthographic { half_height: 3.0 };
     let point = eye + m.matrix3 * DVec3::new(-4.5, 1.5, -7.0);
     near(matrices(&camera, aspect)[1] * point.extend(1.0), [-1.0, 0.5, 7.0, 1.0]);
+    let [(_, pose), ..] = metadata(&camera, aspect);
+    let typed = settings(&pose).unwrap();
+    assert_eq!((typed.eye, typed.fov_y, typed.orthographic), (Some(eye), None, Some(ViewHeight::Units(6.0))));
     // rows of the standard: the translation is at the end
     let [(_, pose), (_, text), _] = metadata(&Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0), 1.0);
     assert_eq!(text, "1,0,0,0,0,1,0,0,0,0,1,0,0,0,-1,1");

@@ -839,6 +839,19 @@ fn cameras_are_found_again_and_typed() {
     let typed = alone.harness.state().control.as_ref().unwrap();
     assert!((typed.eye().y - 40.0).abs() < 1e-9 && (typed.pivot() - target).length() < 1e-6, "{}", typed.eye());
     assert_eq!(alone.mailbox.peek().camera.unwrap().camera_to_world.translation.y, typed.eye().y);
+
+    // parallel rays, by a box or a key; they can be rendered
+    let is_parallel = |alone: &Alone| {
+        matches!(alone.mailbox.peek().camera.unwrap().projection, skylit::scene::Projection::Orthographic { .. })
+    };
+    assert!(!is_parallel(&alone) && alone.shows("Field of view"));
+    alone.click("Parallel rays");
+    alone.harness.run_steps(5);
+    assert!(is_parallel(&alone) && alone.shows("Height of the view") && !alone.shows("Field of view"));
+    let settings = alone.harness.state().render_settings(RenderedMotion::Nothing).unwrap();
+    assert!(settings.flags().join(" ").contains("--orthographic "), "{:?}", settings.flags());
+    press(&mut alone, egui::Modifiers::COMMAND, egui::Key::Num5);
+    assert!(!is_parallel(&alone));
 }
 
 /// Environments are chosen from a list, turned in degrees and brightened in stops.

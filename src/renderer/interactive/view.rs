@@ -29,6 +29,7 @@ use crate::renderer::settings::CameraSettings;
 use crate::renderer::shell::quoted;
 use crate::renderer::still::camera_text;
 use crate::renderer::{RenderSettings, camera_numbers};
+use crate::scene::camera::ViewHeight;
 use crate::scene::{Camera, ClipPlanes, Projection, Scene};
 use crate::tracer::MovedBounds;
 
@@ -478,7 +479,7 @@ pub fn render_command(name: &str, load: &[String], settings: &RenderSettings) ->
 }
 
 /// The settings that choose this camera: the name of one of the file's, or position, target, up
-/// vector and field of view. No settings give the position of another orthographic camera.
+/// vector and field of view or height.
 pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
     if let Some(index) = cameras.iter().position(|c| c == camera) {
         return CameraSettings { camera: Some(index.to_string()), ..Default::default() };
@@ -486,12 +487,12 @@ pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
     camera_placement(camera)
 }
 
-/// Position, target, up vector and field of view of a camera.
+/// Position, target, up vector and field of view or height of a camera.
 pub fn camera_placement(camera: &Camera) -> CameraSettings {
     let to_world = &camera.camera_to_world;
-    let fov_y = match camera.projection {
-        Projection::Perspective { fov_y } => Some(fov_y.to_degrees()),
-        Projection::Orthographic { .. } => None,
+    let (fov_y, orthographic) = match camera.projection {
+        Projection::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
+        Projection::Orthographic { half_height } => (None, Some(ViewHeight::Units(2.0 * half_height))),
     };
     let (eye, forward) = (to_world.translation, -to_world.matrix3.z_axis);
     // far enough for the direction to survive the sum
@@ -503,6 +504,7 @@ pub fn camera_placement(camera: &Camera) -> CameraSettings {
         target: Some(eye + forward * distance),
         up: Some(to_world.matrix3.y_axis),
         fov_y,
+        orthographic,
         clip: Some(camera.clip).filter(|clip| *clip != ClipPlanes::NONE),
     }
 }

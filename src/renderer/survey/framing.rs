@@ -2,13 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::rays::camera_ray;
 use super::{Survey, Trace, VisibleSurface, significant};
 use crate::error::{Error, Result};
 use crate::renderer::settings::CameraSettings;
+use crate::scene::camera::ViewHeight;
 use crate::scene::inventory::open_edges;
 use crate::scene::{Camera, Geometry, Projection, Scene};
 use crate::settings::choices;
@@ -68,6 +69,8 @@ const ENOUGH_DETAIL: f64 = 0.25;
 /// Vertical field of view inside, and outside, radians.
 const INSIDE_FOV_Y: f64 = 1.05;
 const OUTSIDE_FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
+/// Height of a view of parallel rays over that of the scene.
+const FIT_MARGIN: f64 = 1.05;
 /// Cameras outside that are compared: degrees from the front to the right and upwards, and how much
 /// they are preferred. The first is what most models are made for; another must show clearly more.
 const OUTSIDE: [([f64; 2], f64); 12] = [
@@ -103,6 +106,8 @@ pub struct ChosenCamera {
     pub up: DVec3,
     /// Vertical field of view, degrees.
     pub fov_y: f64,
+    /// Height of the view in scene units, if it is one of parallel rays.
+    pub height: Option<f64>,
 }
 
 impl ChosenCamera {
@@ -118,9 +123,7 @@ impl ChosenCamera {
         let (lo, hi) = bounds;
         let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
         let diagonal = (hi - lo).length();
-        // a point near the scene's middle, far enough ahead to survive the rounding
-        let distance = ((lo + hi) * 0.5 - eye).dot(forward).max(0.5 * diagonal);
-        let distance = if distance > 0.0 { distance } else { 1.0 };
+        let distance = distance_ahead(camera, bounds);
         let angle = match camera.projection {
             Projection::Perspective { fov_y } => fov_y.to_degrees(),
             Projection::Orthographic { .. } => OUTSIDE_FOV_Y.to_degrees(),
@@ -132,12 +135,46 @@ impl ChosenCamera {
             target: rounded(eye + forward * distance, diagonal),
             up,
             fov_y: significant(angle, digits),
+            height: None,
         }
+    }
+
+    /// The same camera with parallel rays. `aspect` is width / height of the image.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] for a scene without geometry.
+    pub fn orthographic(mut self, height: ViewHeight, survey: &Survey, aspect: f64) -> Result<Self> {
+        self.height = Some(match height {
+            ViewHeight::Units(height) => height,
+            ViewHeight::Fit => {
+                let (lo, hi) = survey.bounds()?;
+                let camera = Self { height: None, ..self.clone() }.camera();
+                let is_inside = self.eye.cmpge(lo).all() && self.eye.cmple(hi).all();
+                let half = if is_inside {
+                    camera.half_height_at(self.target.distance(self.eye))
+                } else {
+                    // what parallel rays see has another middle
+                    let [low, high] = extent(&camera, &hull(survey.scene));
+                    let m = camera.camera_to_world.matrix3;
+                    let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
+                    let shift = m.x_axis * middle.x + m.y_axis * middle.y;
+                    let size = (hi - lo).length();
+                    (self.eye, self.target) = (rounded(self.eye + shift, size), rounded(self.target + shift, size));
+                    FIT_MARGIN * half.y.max(half.x / aspect)
+                };
+                significant(2.0 * half, 4)
+            }
+        });
+        Ok(self)
     }
 
     /// The camera.
     pub fn camera(&self) -> Camera {
-        Camera::look_at(self.eye, self.target, self.up, self.fov_y.to_radians())
+        let camera = Camera::look_at(self.eye, self.target, self.up, self.fov_y.to_radians());
+        match self.height {
+            Some(height) => Camera { projection: Projection::Orthographic { half_height: 0.5 * height }, ..camera },
+            None => camera,
+        }
     }
 
     /// The settings that choose it.
@@ -146,10 +183,31 @@ impl ChosenCamera {
             eye: Some(self.eye),
             target: Some(self.target),
             up: Some(self.up).filter(|up| *up != DVec3::Y),
-            fov_y: Some(self.fov_y),
+            fov_y: Some(self.fov_y).filter(|_| self.height.is_none()),
+            orthographic: self.height.map(ViewHeight::Units),
             ..CameraSettings::default()
         }
     }
+}
+
+/// Distance along the view of a camera to a point near the middle of a scene with these bounds, far
+/// enough ahead to survive rounding.
+pub(in crate::renderer) fn distance_ahead(camera: &Camera, (lo, hi): (DVec3, DVec3)) -> f64 {
+    let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
+    let distance = ((lo + hi) * 0.5 - eye).dot(forward).max(0.5 * (hi - lo).length());
+    if distance > 0.0 { distance } else { 1.0 }
+}
+
+/// Lower left and upper right corner of what parallel rays show of some spheres, to the right and up
+/// from the camera, scene units.
+fn extent(camera: &Camera, spheres: &[(DVec3, f64)]) -> [DVec2; 2] {
+    let to_camera = camera.camera_to_world.inverse();
+    let of = |&(centre, radius): &(DVec3, f64)| {
+        let p = to_camera.transform_point3(centre).truncate();
+        [p - radius, p + radius]
+    };
+    let none = || [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    spheres.par_iter().map(of).reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
 
 /// A point with as many decimals as tell a ten-thousandth of this size, or more.
@@ -457,6 +515,35 @@ mod tests {
         assert!(is_inside(&camera) && forward.x.abs() > 0.8, "{camera:?}");
         // a courtyard is open above
         assert!(is_inside(&chosen(&|rays| inside(rays, |d| d.y > 0.5))));
+    }
+
+    /// The view from above is as high as the scene, or wide enough for it.
+    #[test]
+    fn parallel_rays_hold_the_scene() {
+        let scene = scene();
+        let survey = Survey::new(&scene);
+        for aspect in [0.5, 1.0, 2.0, 4.0] {
+            let settings =
+                CameraSettings { view: Some(ViewName::Top), orthographic: Some(ViewHeight::Fit), ..Default::default() };
+            let chosen = settings.automatic(&survey, aspect).unwrap().unwrap();
+            let size = BOUNDS.1 - BOUNDS.0;
+            let needed = size.z.max(size.x / aspect);
+            assert!((chosen.height.unwrap() / (FIT_MARGIN * needed) - 1.0).abs() < 1e-3, "{aspect}: {chosen:?}");
+            let camera = settings.choose(&survey, aspect).unwrap();
+            assert_eq!(chosen.settings().choose(&survey, aspect).unwrap(), camera);
+            assert!(matches!(camera.projection, Projection::Orthographic { .. }));
+        }
+        let of = |height| CameraSettings {
+            eye: Some(DVec3::new(0.0, 1.0, 9.0)),
+            target: Some(DVec3::Y),
+            orthographic: Some(height),
+            ..Default::default()
+        };
+        let half = |settings: CameraSettings| settings.choose(&survey, 1.5).unwrap().half_height_at(1.0);
+        assert_eq!(half(of(ViewHeight::Units(5.0))), 2.5);
+        assert!((half(of(ViewHeight::Fit)) - 9.0 * 22.5f64.to_radians().tan()).abs() < 1e-9);
+        let both = CameraSettings { fov_y: Some(30.0), ..of(ViewHeight::Fit) };
+        assert!(both.check().unwrap_err().to_string().contains("--fov-y"));
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub const CONTROLS: &[(&str, &str)] = &[
     ("Double click", "come closer to what is under the pointer, and orbit it"),
     ("F, Home", "frame the whole scene (Shift + F: what is selected), opening view"),
     ("Ctrl + 1, 3, 7", "view from the front, the right, the top (Shift: from the other side)"),
+    ("Ctrl + 5", "perspective or parallel rays"),
     ("B", "keep the camera"),
     ("U", "turntable"),
     ("1 to 5", "fast, balanced, quality, path, converged AO"),

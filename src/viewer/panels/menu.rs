@@ -4,7 +4,7 @@ use egui::{Button, KeyboardShortcut, Ui};
 
 use super::bake;
 use crate::renderer::interactive::ViewPicture;
-use crate::scene::builtin;
+use crate::scene::{Projection, builtin};
 use crate::viewer::app::{App, Arrangement};
 use crate::viewer::camera::AxisView;
 use crate::viewer::dialog::{Dialog, RenderedMotion};
@@ -217,6 +217,9 @@ fn camera(app: &mut App, ui: &mut Ui) {
             }
         }
     });
+    if item(ui, "Perspective / parallel rays", None, "Ctrl+5") {
+        change_projection(app);
+    }
     if item(ui, "Turntable", None, "U") {
         app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
     }
@@ -285,6 +288,15 @@ pub fn open_view(app: &mut App) {
     let Some(opening) = app.control.as_ref().map(|control| control.opening().clone()) else { return };
     let followed = app.scene.as_ref().and_then(|scene| scene.cameras.iter().position(|c| *c == opening));
     app.set_camera(opening, followed);
+}
+
+/// Changes between perspective and parallel rays.
+pub fn change_projection(app: &mut App) {
+    app.leave_followed();
+    if let Some(control) = &mut app.control {
+        let is_orthographic = matches!(control.camera().projection, Projection::Orthographic { .. });
+        control.set_orthographic(!is_orthographic);
+    }
 }
 
 /// Looks along an axis at what the camera looks at.

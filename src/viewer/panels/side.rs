@@ -4,12 +4,12 @@
 use egui::{CollapsingHeader, ComboBox, Response, Ui};
 
 use super::slider::Scale;
-use super::{editor, hierarchy, performance, scene, slider};
+use super::{editor, hierarchy, menu, performance, scene, slider};
 use crate::integrators::{Integrator, IntegratorName};
-use crate::scene::Camera;
 use crate::scene::environments::BuiltinEnvironment;
 use crate::scene::load::{GeometryOptions, NormalSource, Projection, UpAxis};
 use crate::scene::settings::variant_index;
+use crate::scene::{Camera, Projection as CameraProjection};
 use crate::settings::{Capability, Length, Level, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Arrangement, Second};
@@ -489,17 +489,7 @@ fn short_name(path: &str) -> String {
 fn camera(app: &mut App, ui: &mut Ui) {
     let Some(shown) = app.shown_camera() else { return };
     placement(app, ui, &shown);
-    if let crate::scene::Projection::Perspective { fov_y } = shown.projection {
-        let mut degrees = fov_y.to_degrees();
-        ui.horizontal(|ui| {
-            let heading = ui.label("Field of view");
-            // a camera of a file may have another
-            if slider::show(ui, &heading, &mut degrees, 5.0..=120.0, Scale::Linear, "°") {
-                app.leave_followed();
-                app.control.iter_mut().for_each(|control| control.set_fov_y(degrees.to_radians()));
-            }
-        });
-    }
+    camera_projection(app, ui, shown.projection);
 
     // how it moves
     let Some(control) = &mut app.control else { return };
@@ -525,6 +515,35 @@ fn camera(app: &mut App, ui: &mut Ui) {
             Err(e) => app.report(e.to_string(), true),
         }
     }
+}
+
+/// The projection of the camera: its field of view, or the height of what parallel rays show.
+fn camera_projection(app: &mut App, ui: &mut Ui, shown: CameraProjection) {
+    let mut is_orthographic = matches!(shown, CameraProjection::Orthographic { .. });
+    let box_of = ui.checkbox(&mut is_orthographic, "Parallel rays");
+    if box_of.on_hover_text("An orthographic view, as plans and elevations have it\nCtrl + 5").changed() {
+        menu::change_projection(app);
+        return;
+    }
+    ui.horizontal(|ui| match shown {
+        CameraProjection::Perspective { fov_y } => {
+            let mut degrees = fov_y.to_degrees();
+            let heading = ui.label("Field of view");
+            // a camera of a file may have another
+            if slider::show(ui, &heading, &mut degrees, 5.0..=120.0, Scale::Linear, "°") {
+                app.leave_followed();
+                app.control.iter_mut().for_each(|control| control.set_fov_y(degrees.to_radians()));
+            }
+        }
+        CameraProjection::Orthographic { half_height } => {
+            let (mut height, size) = (2.0 * half_height, app.control.as_ref().map_or(1.0, |c| c.scene_size()));
+            let heading = ui.label("Height of the view").on_hover_text("In scene units");
+            if slider::show(ui, &heading, &mut height, 1e-3 * size..=10.0 * size, Scale::Logarithmic, "") {
+                app.leave_followed();
+                app.control.iter_mut().for_each(|control| control.set_height(height));
+            }
+        }
+    });
 }
 
 /// Where the camera is and what it looks at, as numbers to type or to drag.

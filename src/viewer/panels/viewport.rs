@@ -103,6 +103,9 @@ pub fn keys(app: &mut App, context: &Context) {
             menu::view_along(app, view);
         }
     }
+    if context.input_mut(|i| i.consume_key(Modifiers::COMMAND, Key::Num5)) {
+        menu::change_projection(app);
+    }
     if pressed(Key::B) {
         menu::keep_camera(app, context);
     }
