@@ -198,8 +198,8 @@ pub(in crate::renderer) fn distance_ahead(camera: &Camera, (lo, hi): (DVec3, DVe
     if distance > 0.0 { distance } else { 1.0 }
 }
 
-/// Lower left and upper right corner of what parallel rays show of some spheres, to the right and up
-/// from the camera, scene units.
+/// Lower left and upper right corner of what parallel rays show of some spheres, to the right and
+/// up from the camera, scene units.
 fn extent(camera: &Camera, spheres: &[(DVec3, f64)]) -> [DVec2; 2] {
     let to_camera = camera.camera_to_world.inverse();
     let of = |&(centre, radius): &(DVec3, f64)| {
