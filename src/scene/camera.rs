@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::settings::number_or_text;
+
 /// Clipping planes: a camera sees what lies between them. Distances along the view direction, scene
 /// units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,17 +115,7 @@ impl serde::Serialize for ViewHeight {
 
 impl<'de> serde::Deserialize<'de> for ViewHeight {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(serde::Deserialize)]
-        #[serde(untagged)]
-        enum Written {
-            Number(f64),
-            Text(String),
-        }
-        let text = match Written::deserialize(deserializer)? {
-            Written::Number(height) => height.to_string(),
-            Written::Text(text) => text,
-        };
-        text.parse().map_err(serde::de::Error::custom)
+        number_or_text(deserializer)
     }
 }
 

@@ -69,18 +69,28 @@ impl Serialize for Length {
     }
 }
 
+/// Reads a value that files give as a number or as text.
+///
+/// # Errors
+/// Those of its `FromStr`.
+pub(crate) fn number_or_text<'de, D: Deserializer<'de>, T: FromStr<Err: fmt::Display>>(
+    deserializer: D,
+) -> Result<T, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Value {
+        Number(f64),
+        Text(String),
+    }
+    let text = match Value::deserialize(deserializer)? {
+        Value::Number(number) => number.to_string(),
+        Value::Text(text) => text,
+    };
+    text.parse().map_err(serde::de::Error::custom)
+}
+
 impl<'de> Deserialize<'de> for Length {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Value {
-            Number(f64),
-            Text(String),
-        }
-        let text = match Value::deserialize(deserializer)? {
-            Value::Number(number) => number.to_string(),
-            Value::Text(text) => text,
-        };
-        text.parse().map_err(serde::de::Error::custom)
+        number_or_text(deserializer)
     }
 }

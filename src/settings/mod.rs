@@ -13,6 +13,7 @@ pub mod parse;
 pub(crate) use choices::choices;
 pub use edit::{Choice, ChoiceValue, Editable, Setting, Value};
 pub use length::Length;
+pub(crate) use length::number_or_text;
 
 use crate::error::{Error, Result};
 

@@ -2,15 +2,13 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::renderer::settings::DEFAULT_FOV_Y;
 use crate::scene::{Camera, Projection};
 
 /// Angle per point of the screen that a drag turns the camera by, radians.
 const TURN: f64 = 0.006;
 /// Closest that the view direction comes to the vertical, radians.
 const POLE: f64 = 1e-3;
-
-/// Vertical field of view after parallel rays, radians.
-const FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
 
 /// A camera that a user moves: its position, and a pivot in front of it around which it orbits.
 /// World up is +y.
@@ -227,7 +225,7 @@ impl CameraControl {
                 self.camera.projection = Projection::Orthographic { half_height };
             }
             Projection::Orthographic { .. } if !is_orthographic => {
-                let (pivot, fov_y) = (self.pivot(), FOV_Y);
+                let (pivot, fov_y) = (self.pivot(), DEFAULT_FOV_Y.to_radians());
                 self.camera.projection = Projection::Perspective { fov_y };
                 self.distance = half_height / (0.5 * fov_y).tan();
                 self.camera.camera_to_world.translation = pivot - self.forward() * self.distance;

@@ -8,6 +8,7 @@ use super::BuilderSession;
 use crate::accel::BuildPreset;
 use crate::accel::flatten::FlatScene;
 use crate::accel::lab::analysis::analyse;
+use crate::accel::lab::budget::Whole;
 use crate::accel::lab::builder::MAX_LEAF;
 use crate::accel::lab::cells::{CellKind, Cells};
 use crate::accel::lab::influence::{InfluenceArea, areas_of_rays};
@@ -122,9 +123,13 @@ pub fn scene(session: &mut BuilderSession, source: &str) -> Result<()> {
             interrupt::check()?;
         }
         if !areas.is_empty() {
+            // the tree of the whole, which all local ones are beside
+            let placed = Body::from_scene(&flat)?;
+            let whole = Builder::Preset(BuildPreset::Default).tree(&placed.boxes(), MAX_LEAF);
+            let whole = Whole { body: &placed, tree: &whole };
             for choice in LOCAL_RULES {
                 session.phase(format!("{source}: {}, trees of areas by {}", stream.name, choice.name()));
-                run_local(session, source, &flat, stream, choice, &areas)?;
+                run_local(session, source, (&flat, &whole), stream, choice, &areas)?;
                 interrupt::check()?;
             }
         }
@@ -235,17 +240,15 @@ fn count_cells(
 fn run_local(
     session: &mut BuilderSession,
     source: &str,
-    flat: &FlatScene,
+    (flat, whole): (&FlatScene, &Whole),
     stream: &RayStream,
     choice: HeuristicChoice,
     areas: &[InfluenceArea],
 ) -> Result<()> {
     let heuristic = choice.heuristic(RayDistribution::Uniform);
-    let body = Body::from_scene(flat)?;
-    let whole = Builder::Preset(BuildPreset::Default).tree(&body.boxes(), MAX_LEAF);
     let start = Instant::now();
     let top = (TopLevelKind::List, FallbackStart::Exit);
-    let trees = LocalTrees::build(&body, &whole, areas.to_vec(), heuristic, top);
+    let trees = LocalTrees::build(whole.body, whole.tree, areas.to_vec(), heuristic, top);
     let seconds = start.elapsed().as_secs_f64();
     let visits = trees.visits(&stream.rays, stream.query);
     let both = visits.local.plus(visits.whole);
