@@ -357,26 +357,30 @@ impl<'a> Baker<'a> {
         texel.samples += 1u32 << self.sample_bits;
     }
 
-    /// Each point, on the instances that count.
+    /// Each point, on the instances that count. A texel of one or two points, as those along the
+    /// borders of charts are, samples them four times or twice, so that it has as many samples as
+    /// others.
     fn sampled_points(&self, points: &[TexelPoint]) -> Vec<Sampled> {
         let most = if self.settings.averages_instances { usize::MAX } else { 1 };
         let mut sampled = Vec::with_capacity(points.len());
-        let mut place = 0;
-        for (index, point) in points.iter().enumerate() {
-            // the points of a texel take parts of one sequence of samples
-            place = if index > 0 && points[index - 1].texel == point.texel { place + 1 } else { 0 };
-            let surface = &self.texture.surfaces[point.surface as usize];
-            for (nth, &instance) in surface.instances.iter().take(most).enumerate() {
-                let part = nth * POINTS + place;
-                let record = BakePoint {
-                    instance: instance as u32,
-                    primitive: point.triangle,
-                    u: point.barycentrics.x,
-                    v: point.barycentrics.y,
-                    texel: point.texel[0] | point.texel[1] << 16,
-                    first_sample: (part as u32) << self.sample_bits,
-                };
-                sampled.push(Sampled { point: *point, instance, record });
+        for of_texel in points.chunk_by(|a, b| a.texel == b.texel) {
+            let times = if self.settings.map.is_sampled() { POINTS / of_texel.len() } else { 1 };
+            for (place, point) in of_texel.iter().enumerate() {
+                let surface = &self.texture.surfaces[point.surface as usize];
+                for (nth, &instance) in surface.instances.iter().take(most).enumerate() {
+                    // the points of a texel take parts of one sequence of samples
+                    for part in (0..times).map(|time| nth * POINTS + time * of_texel.len() + place) {
+                        let record = BakePoint {
+                            instance: instance as u32,
+                            primitive: point.triangle,
+                            u: point.barycentrics.x,
+                            v: point.barycentrics.y,
+                            texel: point.texel[0] | point.texel[1] << 16,
+                            first_sample: (part as u32) << self.sample_bits,
+                        };
+                        sampled.push(Sampled { point: *point, instance, record });
+                    }
+                }
             }
         }
         sampled
