@@ -33,7 +33,8 @@ const LAYERS: &[&[&str]] = &[
     &["renderer"],
     &["terminal"],
     &["report"],
-    &["bake", "bench", "compare", "stress", "verify", "viewer"],
+    &["bake"],
+    &["bench", "compare", "stress", "verify", "viewer"],
     &["cli"],
 ];
 

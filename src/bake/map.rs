@@ -6,8 +6,9 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::cage::{Cage, CageFrames};
 use super::frames::{SurfaceFrames, SurfacePoint};
+use super::kept::{KeptParts, Part};
 use super::light::LightTracer;
-use super::plan::PlannedTexture;
+use super::plan::{PlannedTexture, Surface};
 use super::seams::{SeamLookups, Seams};
 use super::smooth::{FilterTexel, smooth};
 use super::texels::{BAND, Layout, POINTS, TexelPoint};
@@ -36,6 +37,11 @@ pub struct BakedMap {
     pub values: Vec<Vec3>,
     /// Texels that surfaces cover.
     pub covered: Vec<bool>,
+    /// Variance of a sample of each texel, as far as samples are independent; of texels that are
+    /// filled that of the covered one. Empty unless [`BakeSettings::has_noise`].
+    pub variances: Vec<f32>,
+    /// Number of samples of each texel, likewise.
+    pub samples: Vec<u32>,
     /// Texels that a surface covers, but inside of other geometry: they are filled as those that
     /// none covers.
     pub hidden: usize,
@@ -50,15 +56,20 @@ pub struct BakedMap {
 }
 
 /// Sums over a texel's samples.
-#[derive(Clone, Copy, Default)]
-struct TexelSums {
-    value: Vec3,
-    scalar: f64,
-    squares: f64,
-    samples: u32,
-    /// Position and normal of the first point.
-    position: DVec3,
-    normal: Vec3,
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexelSums {
+    /// Sum of the values, or of directions.
+    pub value: Vec3,
+    /// Sum of the values that the variance is of.
+    pub scalar: f64,
+    /// Sum of their squares.
+    pub squares: f64,
+    /// Number of samples.
+    pub samples: u32,
+    /// Position of the first point, where noise is filtered.
+    pub position: DVec3,
+    /// Normal of the first point, where noise is filtered.
+    pub normal: Vec3,
 }
 
 impl TexelSums {
@@ -89,53 +100,114 @@ pub struct Traced<'a> {
     pub cage: Option<Cage<'a>>,
 }
 
-/// Bakes a texture of a scene's surfaces; `control` hears how many bands of rows are done.
-///
-/// # Errors
-/// Those of the device, and [`Error::Interrupted`].
-pub fn bake(
+/// A texture whose texels are being sampled.
+pub struct TextureBake<'a> {
+    scene: &'a Scene,
+    texture: &'a PlannedTexture,
+    settings: &'a BakeSettings,
+    /// Sums by texel, rows from the top.
+    texels: Vec<TexelSums>,
+    hidden: usize,
+    rays: u64,
+}
+
+impl<'a> TextureBake<'a> {
+    /// Begins with no samples.
+    pub fn new(scene: &'a Scene, texture: &'a PlannedTexture, settings: &'a BakeSettings) -> Self {
+        let count = texture.size[0] as usize * texture.size[1] as usize;
+        Self { scene, texture, settings, texels: vec![TexelSums::default(); count], hidden: 0, rays: 0 }
+    }
+
+    /// Samples the surfaces of one of the texture's materials, or all; `control` hears how many
+    /// bands of rows are done. What `kept` has of them is not sampled again, and it gets the rest.
+    ///
+    /// # Errors
+    /// Those of the device and of `kept`, and [`Error::Interrupted`].
+    pub fn sample(
+        &mut self,
+        traced: Traced,
+        material: Option<usize>,
+        mut kept: Option<&mut KeptParts>,
+        control: &mut dyn Control,
+    ) -> Result<()> {
+        let Self { texture, settings, .. } = *self;
+        let shown = texture.shown_corners();
+        let is_sampled = |surface: &Surface| material.is_none_or(|material| surface.material == material);
+        let own = |(corners, surface)| if is_sampled(surface) { corners } else { &[][..] };
+        let corners: Vec<&[[Vec2; 3]]> = shown.iter().map(|c| &c[..]).zip(&texture.surfaces).map(own).collect();
+        let layout = Layout::new(texture.size, &corners);
+        let mut baker = Baker::new(self.scene, traced, texture, settings)?;
+
+        // bands of rows, so many that their points are a batch
+        let [width, height] = texture.size.map(|n| n as usize);
+        let bands_at_a_time = (BATCH / (POINTS * width * BAND as usize)).max(1);
+        let bands = layout.band_count();
+        let instances = texture.surfaces.iter().map(|s| s.instances.len()).max().unwrap_or_default();
+        let points_at_a_time = if settings.averages_instances { BATCH / instances.max(1) } else { BATCH };
+        for first in (0..bands).step_by(bands_at_a_time) {
+            if control.should_stop()? {
+                return Err(Error::Interrupted);
+            }
+            let last = (first + bands_at_a_time).min(bands);
+            let rows = width * (first * BAND as usize)..width * height.min(last * BAND as usize);
+            if let Some(part) = kept.as_mut().map(|kept| kept.next(&rows)).transpose()?.flatten() {
+                part.texels.into_iter().for_each(|(at, sums)| self.texels[at] = sums);
+                self.hidden += part.hidden;
+                self.rays += part.rays;
+                control.progress(last as u64, bands as u64);
+                continue;
+            }
+
+            // the samples of their points
+            let found = layout.points(first..last);
+            let points: Vec<TexelPoint> = found.into_iter().flat_map(|band| band.points).collect();
+            let (mut hidden, before) = (0, baker.rays);
+            for part in parts_of_texels(&points, points_at_a_time) {
+                hidden += baker.add(part, &mut self.texels, control)?;
+            }
+            let rays = baker.rays - before;
+            if let Some(kept) = &mut kept {
+                let sums = rows.clone().map(|at| (at, self.texels[at])).filter(|(_, sums)| sums.samples > 0);
+                kept.add(&rows, &Part { texels: sums.collect(), hidden, rays })?;
+            }
+            self.hidden += hidden;
+            self.rays += rays;
+            control.progress(last as u64, bands as u64);
+        }
+        Ok(())
+    }
+
+    /// Turns the sums into the map.
+    pub fn finish(self) -> BakedMap {
+        let Self { scene, texture, settings, texels, hidden, rays } = self;
+        map_of_sums(
+            scene,
+            texture,
+            settings,
+            &texels,
+            BakedMap { size: texture.size, hidden, rays, ..BakedMap::default() },
+        )
+    }
+}
+
+/// Fills a map with the values of sums.
+fn map_of_sums(
     scene: &Scene,
-    traced: Traced,
     texture: &PlannedTexture,
     settings: &BakeSettings,
-    control: &mut dyn Control,
-) -> Result<BakedMap> {
-    let shown = texture.shown_corners();
-    let corners: Vec<&[[Vec2; 3]]> = shown.iter().map(|corners| &corners[..]).collect();
-    let layout = Layout::new(texture.size, &corners);
-    let count = texture.size[0] as usize * texture.size[1] as usize;
-    let mut map = BakedMap { size: texture.size, ..BakedMap::default() };
-    let mut baker = Baker::new(scene, traced, texture, settings)?;
-    let mut texels = vec![TexelSums::default(); count];
-
-    // bands of rows, so many that their points are a batch
-    let bands_at_a_time = (BATCH / (POINTS * (texture.size[0] * BAND) as usize)).max(1);
-    let bands = layout.band_count();
-    let instances = texture.surfaces.iter().map(|s| s.instances.len()).max().unwrap_or_default();
-    let points_at_a_time = if settings.averages_instances { BATCH / instances.max(1) } else { BATCH };
-    for first in (0..bands).step_by(bands_at_a_time) {
-        if control.should_stop()? {
-            return Err(Error::Interrupted);
-        }
-        let found = layout.points(first..(first + bands_at_a_time).min(bands));
-        let points: Vec<TexelPoint> = found.into_iter().flat_map(|band| band.points).collect();
-        for part in parts_of_texels(&points, points_at_a_time) {
-            map.hidden += baker.add(part, &mut texels, control)?;
-        }
-        control.progress((first + bands_at_a_time).min(bands) as u64, bands as u64);
-    }
-    map.rays = baker.rays;
-
+    texels: &[TexelSums],
+    mut map: BakedMap,
+) -> BakedMap {
     // means, and the error that their samples' spread leaves
     let (mut error, mut covered) = (0.0, 0u64);
-    for texel in &texels {
+    for texel in texels {
         map.covered.push(texel.samples > 0);
-        map.values.push(baker.value(texel));
+        map.values.push(mean_of(settings.map, texel));
         error += texel.variance();
         covered += u64::from(texel.samples > 0);
     }
     if settings.is_smoothed && settings.map.is_sampled() {
-        smooth_values(&mut map, settings.map, &texels);
+        smooth_values(&mut map, settings.map, texels);
     }
     map.error = (error / covered.max(1) as f64).sqrt();
     let shown = map.values.iter().zip(&map.covered).filter(|(_, covered)| **covered).map(|(v, _)| *v);
@@ -148,6 +220,11 @@ pub fn bake(
         None => background(settings.map, map.values[at]),
     });
     map.values = filled.collect();
+    if settings.has_noise {
+        let shown = nearest.iter().enumerate().map(|(at, from)| &texels[from.map_or(at, |from| from as usize)]);
+        let noise = |texel: &TexelSums| ((texel.variance() * f64::from(texel.samples)) as f32, texel.samples);
+        (map.variances, map.samples) = shown.map(noise).unzip();
+    }
 
     // edges whose sides lie apart
     if let Some(lookups) = SeamLookups::find(scene, texture, settings) {
@@ -156,7 +233,16 @@ pub fn bake(
         }
         map.seams = lookups.measure(&map.values);
     }
-    Ok(map)
+    map
+}
+
+/// The value of a texel: a mean, or a direction of unit length.
+fn mean_of(map: Map, texel: &TexelSums) -> Vec3 {
+    match map {
+        _ if texel.samples == 0 => Vec3::ZERO,
+        Map::BentNormal | Map::Normal => texel.value.normalize_or(Vec3::Z),
+        _ => texel.value / texel.samples as f32,
+    }
 }
 
 /// Points in parts of about so many, each of which has all points of its texels.
@@ -468,15 +554,6 @@ impl<'a> Baker<'a> {
             Space::Object | Space::Tangent => {
                 self.scene.instances[sample.instance].object_to_world.inverse().transform_point3(traced.world).as_vec3()
             }
-        }
-    }
-
-    /// The value of a texel: a mean, or a direction of unit length.
-    fn value(&self, texel: &TexelSums) -> Vec3 {
-        match self.settings.map {
-            _ if texel.samples == 0 => Vec3::ZERO,
-            Map::BentNormal | Map::Normal => texel.value.normalize_or(Vec3::Z),
-            _ => texel.value / texel.samples as f32,
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Baking: ambient occlusion, and other properties of surfaces, as textures of a model or as
 //! colours of its vertices.
 //!
-//! [`plan`] decides which textures there are and where surfaces lie in them: by texture coordinates
-//! that a file has, if no two places share a texel, else by coordinates that are made for it
-//! ([`unwrap`]). [`texels`] finds the points of surfaces that each texel shows, [`trace`] samples
-//! the hemispheres over them by the renderer's tracers, [`map`] turns the sums into values,
-//! [`fill`] extends them beyond the borders of charts, and [`seams`] compares them there.
-//! [`vertices`] does the same for vertices. [`document`] writes the results into the model's own
-//! file, of which all else stays.
+//! [`plan`] decides which textures there are, one a material or one for all, and where surfaces lie
+//! in them: by texture coordinates that a file has, if no two places share a texel, else by
+//! coordinates that are made for it ([`unwrap`]). [`texels`] finds the points of surfaces that each
+//! texel shows, [`trace`] samples the hemispheres over them by the renderer's tracers, [`kept`]
+//! keeps the sums in a file, [`map`] turns them into values, [`fill`] extends those beyond the
+//! borders of charts, and [`seams`] compares them there. [`vertices`] does the same for vertices.
+//! [`document`] writes the results into the model's own file, of which all else stays.
 
 pub mod agreement;
 mod backfaces;
@@ -15,8 +15,11 @@ pub mod cage;
 pub mod document;
 pub mod fill;
 mod frames;
+pub mod kept;
 pub mod light;
 pub mod map;
+#[cfg(feature = "cli")]
+pub mod options;
 pub mod pack;
 pub mod picture;
 pub mod plan;
@@ -193,6 +196,10 @@ pub struct BakeSettings {
     pub averages_instances: bool,
     /// Each instance of a mesh has a texture of its own.
     pub has_unique_instances: bool,
+    /// All materials share one texture.
+    pub is_atlas: bool,
+    /// Maps have the variance and the number of samples of each texel.
+    pub has_noise: bool,
     /// Names of the materials that are baked; none: all.
     pub materials: Vec<String>,
     /// The light of [`Map::Light`].
@@ -217,6 +224,8 @@ impl Default for BakeSettings {
             space: Space::default(),
             averages_instances: false,
             has_unique_instances: false,
+            is_atlas: false,
+            has_noise: false,
             materials: Vec::new(),
             light: LightSettings::default(),
         }

@@ -82,6 +82,11 @@ pub fn save(map: &BakedMap, settings: &BakeSettings, bits: Bits, path: &Path) ->
         let png = png(map, settings, bits)?;
         return files::write_atomically(path, |file| std::io::Write::write_all(file, &png));
     }
+    output::exr::write(&image(map, settings), path)
+}
+
+/// A map with its values as they are: grey, or RGB.
+pub fn image(map: &BakedMap, settings: &BakeSettings) -> Image {
     let plane = |k: usize| map.values.iter().map(|v| v[k]).collect();
     let channels = if settings.map.is_rgb() {
         ["R", "G", "B"].iter().enumerate().map(|(k, name)| Channel::from_floats(*name, plane(k))).collect()
@@ -89,5 +94,5 @@ pub fn save(map: &BakedMap, settings: &BakeSettings, bits: Bits, path: &Path) ->
         vec![Channel::from_floats("Y", plane(0))]
     };
     let metadata = vec![("bake.map".to_owned(), settings.map.name().to_owned())];
-    output::exr::write(&Image { width: map.size[0], height: map.size[1], channels, metadata }, path)
+    Image { width: map.size[0], height: map.size[1], channels, metadata }
 }

@@ -1,4 +1,5 @@
-//! Which textures a model gets: one for each material, and where its surfaces lie in it.
+//! Which textures a model gets: one for each material or one for all of them, and where surfaces
+//! lie in it.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,14 +18,15 @@ use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
 const MAX_OVERLAP: f64 = 2e-3;
 /// Share of a surface's area that may lie at no place of the texture.
 const MAX_LOST: f64 = 1e-2;
+/// Name of the texture of all materials.
+const ATLAS: &str = "atlas";
 
 /// A texture, and the surfaces that it shows.
 pub struct PlannedTexture {
-    /// Name of the material; its number where it has none.
+    /// Name of the material; `atlas` for the texture of all of them.
     pub name: String,
-    /// Index of the material in the glTF file; `None` for primitives without one, and for files of
-    /// other formats.
-    pub material: Option<usize>,
+    /// The materials that show it: one, or all of an atlas.
+    pub materials: Vec<PlannedMaterial>,
     /// Width and height, texels.
     pub size: [u32; 2],
     /// Number of the set of texture coordinates.
@@ -61,11 +63,23 @@ impl PlannedTexture {
     }
 }
 
+/// A material that shows a texture.
+#[derive(Clone)]
+pub struct PlannedMaterial {
+    /// Name; the material's number where it has none.
+    pub name: String,
+    /// Index in the glTF file; `None` for primitives without a material, and for files of other
+    /// formats.
+    pub index: Option<usize>,
+}
+
 /// A mesh in a texture.
 #[derive(Clone)]
 pub struct Surface {
     /// Index of the scene's mesh.
     pub mesh: usize,
+    /// Index of its material among those of the texture.
+    pub material: usize,
     /// The scene's instances that show it.
     pub instances: Vec<usize>,
     /// Texture coordinates of the corners of each triangle.
@@ -121,19 +135,34 @@ pub fn plan(
     settings: &BakeSettings,
     control: &mut dyn Control,
 ) -> Result<Vec<PlannedTexture>> {
-    let mut textures = Vec::new();
-    for (number, (material, meshes)) in meshes_by_material(scene).into_iter().enumerate() {
+    // the materials that are baked, and those that share a texture
+    let mut groups: Vec<TextureGroup> = Vec::new();
+    for (number, (index, meshes)) in meshes_by_material(scene).into_iter().enumerate() {
         let first = &scene.materials[scene.meshes[meshes[0]].material];
         let name = if first.name.is_empty() { format!("material{number}") } else { first.name.clone() };
         if settings.materials.iter().any(|wanted| !wanted.is_empty()) && !settings.materials.contains(&name) {
             continue;
         }
-        let planned = plan_material(scene, file, settings, &name, material, &meshes, control)?;
+        let material = PlannedMaterial { name, index };
+        match groups.last_mut().filter(|_| settings.is_atlas) {
+            Some(atlas) => atlas.add(material, meshes),
+            None => groups.push(TextureGroup::new(settings.is_atlas, material, meshes)),
+        }
+    }
+    let known: BTreeSet<&String> = groups.iter().flat_map(|group| &group.materials).map(|m| &m.name).collect();
+    if let Some(missing) = settings.materials.iter().find(|wanted| !known.contains(wanted)) {
+        return Err(Error::Usage(format!("--only-material {missing}: no surface has a material of that name")));
+    }
+
+    // their textures
+    let mut textures = Vec::new();
+    for group in groups {
+        let planned = plan_group(scene, file, settings, &group, control)?;
         let own = |texture| if settings.has_unique_instances { placements(scene, texture) } else { vec![texture] };
         textures.extend(planned.into_iter().flat_map(own));
     }
-    if let Some(missing) = settings.materials.iter().find(|wanted| !textures.iter().any(|t| t.name == **wanted)) {
-        return Err(Error::Usage(format!("--only-material {missing}: no surface has a material of that name")));
+    if file.is_some() && settings.has_unique_instances {
+        check_nodes(scene, &textures)?;
     }
     if textures.is_empty() {
         return Err(Error::Scene(format!("{}: has no triangles, and nothing else has texels", scene.name)));
@@ -141,28 +170,65 @@ pub fn plan(
     Ok(textures)
 }
 
-/// Plans the texture of a material, or of each tile that it has.
-fn plan_material(
+/// Materials that share a texture, and their meshes.
+struct TextureGroup {
+    /// Name of the texture.
+    name: String,
+    /// The name in sentences.
+    label: String,
+    materials: Vec<PlannedMaterial>,
+    /// Each mesh, and the index of its material in the list.
+    meshes: Vec<(usize, usize)>,
+}
+
+impl TextureGroup {
+    /// Makes the group of a material, the first one of an atlas.
+    fn new(is_atlas: bool, material: PlannedMaterial, meshes: Vec<usize>) -> Self {
+        let name = if is_atlas { ATLAS.to_owned() } else { material.name.clone() };
+        let label = if is_atlas { ATLAS.to_owned() } else { format!("material `{name}`") };
+        let mut group = Self { name, label, materials: Vec::new(), meshes: Vec::new() };
+        group.add(material, meshes);
+        group
+    }
+
+    /// Adds a material.
+    fn add(&mut self, material: PlannedMaterial, meshes: Vec<usize>) {
+        self.meshes.extend(meshes.into_iter().map(|mesh| (mesh, self.materials.len())));
+        self.materials.push(material);
+    }
+
+    /// The sets of texture coordinates that may be those of the texture, in the order of trial.
+    fn candidates(&self, scene: &Scene, settings: &BakeSettings) -> Vec<u32> {
+        match settings.texcoords {
+            // an atlas was written into the last of its sets
+            TexcoordChoice::Auto if settings.is_atlas => {
+                let sources = self.meshes.iter().filter_map(|(mesh, _)| scene.meshes[*mesh].source.as_ref());
+                let sets: BTreeSet<u32> = sources.flat_map(|s| s.texcoord_sets.iter().copied()).chain([0, 1]).collect();
+                sets.into_iter().rev().collect()
+            }
+            TexcoordChoice::Auto => vec![1, 0],
+            TexcoordChoice::Set(set) => vec![set],
+            TexcoordChoice::Unwrap => Vec::new(),
+        }
+    }
+}
+
+/// Plans the texture of a group, or of each tile that it has.
+fn plan_group(
     scene: &Scene,
     file: Option<&SourceFile>,
     settings: &BakeSettings,
-    name: &str,
-    material: Option<usize>,
-    meshes: &[usize],
+    group: &TextureGroup,
     control: &mut dyn Control,
 ) -> Result<Vec<PlannedTexture>> {
     // a set that the file has, if its coordinates are unique
     let mut remarks = Vec::new();
-    let candidates: &[u32] = match settings.texcoords {
-        TexcoordChoice::Auto => &[1, 0],
-        TexcoordChoice::Set(ref set) => std::slice::from_ref(set),
-        TexcoordChoice::Unwrap => &[],
-    };
-    for &set in candidates {
+    let TextureGroup { name, label, materials, meshes } = group;
+    for set in group.candidates(scene, settings) {
         let Some(surfaces) = surfaces_by_set(scene, meshes, set) else { continue };
         let texture = |tile, remarks| PlannedTexture {
-            name: name.to_owned(),
-            material,
+            name: name.clone(),
+            materials: materials.clone(),
             size: settings.size,
             texcoord: set,
             unwrapped: Vec::new(),
@@ -176,47 +242,49 @@ fn plan_material(
         let tiles = fault.is_overlap.then(|| udim::tiles(settings.size, &corners, MAX_OVERLAP)).flatten();
         match tiles {
             // what was remarked on other sets is said once
-            Some(tiles) if file.is_none() => {
+            Some(tiles) if file.is_none() && !settings.is_atlas => {
                 let texture = |tile| texture(Some(tile), std::mem::take(&mut remarks));
                 return Ok(tiles.into_iter().map(texture).collect());
             }
+            Some(tiles) if settings.is_atlas => remarks
+                .push(format!("{label}: texture coordinates {set} lie in {} tiles (UDIM), not in one", tiles.len())),
             Some(tiles) => remarks.push(format!(
-                "material `{name}`: texture coordinates {set} lie in {} tiles (UDIM), which glTF does not have; images \
-                 have one each",
+                "{label}: texture coordinates {set} lie in {} tiles (UDIM), which glTF does not have; images have one \
+                 each",
                 tiles.len()
             )),
-            None => remarks.push(format!("material `{name}`: texture coordinates {set} {}", fault.text)),
+            None => remarks.push(format!("{label}: texture coordinates {set} {}", fault.text)),
         }
     }
     if let TexcoordChoice::Set(set) = settings.texcoords {
-        let reason = remarks
-            .pop()
-            .unwrap_or_else(|| format!("material `{name}`: not all meshes have texture coordinates {set}"));
+        let reason = remarks.pop().unwrap_or_else(|| format!("{label}: not all meshes have texture coordinates {set}"));
         return Err(Error::Usage(format!("{reason}: --texcoord unwrap makes some that are unique")));
     }
 
     // else coordinates of its own, which only a file can hold
     let Some(file) = file else {
-        let reason = remarks.pop().unwrap_or_else(|| format!("material `{name}`: has no texture coordinates"));
+        let reason = remarks.pop().unwrap_or_else(|| format!("{label}: has no texture coordinates"));
         return Err(Error::Usage(format!(
             "{reason}: bake into a model, -o NAME.glb, which gets texture coordinates that are unique"
         )));
     };
-    let unwrapped = unwrap::unwrap(scene, file, meshes, settings, name, control)?;
+    let numbers: Vec<usize> = meshes.iter().map(|(mesh, _)| *mesh).collect();
+    let unwrapped = unwrap::unwrap(scene, file, &numbers, settings, label, control)?;
     remarks.push(format!(
-        "material `{name}`: {} charts in TEXCOORD_{}, {:.0} % of the texture",
+        "{label}: {} charts in TEXCOORD_{}, {:.0} % of the texture",
         unwrapped.charts,
         unwrapped.texcoord,
         100.0 * unwrapped.utilization
     ));
-    let surface = |(&mesh, made): (&usize, &UnwrappedMesh)| Surface {
+    let surface = |(&(mesh, material), made): (&(usize, usize), &UnwrappedMesh)| Surface {
         mesh,
+        material,
         instances: instances_of(scene, mesh),
         corners: made.scene_corners.clone(),
     };
     Ok(vec![PlannedTexture {
-        name: name.to_owned(),
-        material,
+        name: name.clone(),
+        materials: materials.clone(),
         size: unwrapped.size,
         texcoord: unwrapped.texcoord,
         surfaces: meshes.iter().zip(&unwrapped.meshes).map(surface).collect(),
@@ -248,15 +316,17 @@ fn placements(scene: &Scene, texture: PlannedTexture) -> Vec<PlannedTexture> {
         return vec![texture];
     }
 
-    let mut remarks = texture.remarks;
+    // the first one brings new vertices, which all instances share
+    let (mut remarks, mut unwrapped) = (texture.remarks, texture.unwrapped);
     let nth = |k: usize| PlannedTexture {
         name: texture.name.clone(),
-        unwrapped: Vec::new(),
+        materials: texture.materials.clone(),
+        unwrapped: std::mem::take(&mut unwrapped),
         surfaces: (texture.surfaces.iter().zip(&placed))
             .filter_map(|(surface, placed)| {
                 let instance = *placed.get(k)?;
                 let mesh = scene.instances[instance].mesh;
-                Some(Surface { mesh, instances: vec![instance], corners: surface.corners.clone() })
+                Some(Surface { mesh, instances: vec![instance], ..surface.clone() })
             })
             .collect(),
         placement: Some(k),
@@ -266,9 +336,32 @@ fn placements(scene: &Scene, texture: PlannedTexture) -> Vec<PlannedTexture> {
     (0..most).map(nth).collect()
 }
 
+/// Checks that each instance with a texture of its own has a node of its own in the file.
+///
+/// # Errors
+/// [`Error::Usage`] for a node that places its mesh several times.
+fn check_nodes(scene: &Scene, textures: &[PlannedTexture]) -> Result<()> {
+    let mut known = BTreeSet::new();
+    let placed = textures.iter().filter(|texture| texture.placement.is_some()).flat_map(|texture| &texture.surfaces);
+    for surface in placed {
+        let primitive = scene.meshes[surface.mesh].source.as_ref().map(|source| source.primitive);
+        for &instance in &surface.instances {
+            let node = scene.report.instance_nodes.get(instance).copied();
+            if node.is_none() || !known.insert((node, primitive)) {
+                return Err(Error::Usage(format!(
+                    "--unique-instances: node `{}` places its mesh several times (EXT_mesh_gpu_instancing), and a glTF \
+                     file has one material for all of them: bake images, .png or .exr, or leave the option out",
+                    scene.instances[instance].name
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The meshes by a set of texture coordinates, which all of them must have.
-fn surfaces_by_set(scene: &Scene, meshes: &[usize], set: u32) -> Option<Vec<Surface>> {
-    let surface = |&mesh: &usize| {
+fn surfaces_by_set(scene: &Scene, meshes: &[(usize, usize)], set: u32) -> Option<Vec<Surface>> {
+    let surface = |&(mesh, material): &(usize, usize)| {
         let triangles = triangles_of(&scene.meshes[mesh])?;
         let place = match &scene.meshes[mesh].source {
             Some(source) => source.texcoord_sets.iter().position(|s| *s == set)?,
@@ -279,7 +372,7 @@ fn surfaces_by_set(scene: &Scene, meshes: &[usize], set: u32) -> Option<Vec<Surf
             return None;
         }
         let corners = triangles.indices.iter().map(|t| t.map(|v| texcoords[v as usize])).collect();
-        Some(Surface { mesh, instances: instances_of(scene, mesh), corners })
+        Some(Surface { mesh, material, instances: instances_of(scene, mesh), corners })
     };
     meshes.iter().map(surface).collect()
 }

@@ -4,9 +4,11 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec4};
+use xxhash_rust::xxh3::Xxh3;
 
-use super::cage::Detailed;
-use super::map::{self, BakedMap, Traced};
+use super::cage::{Cage, Detailed};
+use super::kept::KeptParts;
+use super::map::{BakedMap, TextureBake, Traced};
 use super::plan::{PlannedTexture, meshes_by_material};
 use super::vertices::{self, BakedVertices};
 use super::{BakeSettings, Map, Occluders};
@@ -19,7 +21,7 @@ use crate::integrators::ao::Hemisphere;
 use crate::scene::builtin::shapes;
 use crate::scene::load::SourceFile;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Instance, Material, Mesh, Motion, Scene};
+use crate::scene::{Instance, Material, Mesh, Motion, Scene, fingerprint};
 use crate::tracer::{DeviceSettings, Needs, Tracer};
 
 /// Side of the ground plane, in diagonals of the scene.
@@ -49,15 +51,85 @@ impl BakeSession<'_> {
     /// # Errors
     /// Those of the device, and [`crate::Error::Interrupted`].
     pub fn bake_textures(&self, planned: &[PlannedTexture], control: &mut dyn Control) -> Result<Vec<BakedMap>> {
-        let mut maps = Vec::new();
-        let groups = planned.iter().map(|t| t.surfaces.iter().map(|s| s.mesh).collect()).collect::<Vec<Vec<usize>>>();
+        self.bake_textures_in_parts(planned, None, control)
+    }
+
+    /// Bakes each texture, of which `kept` has and gets finished parts.
+    ///
+    /// # Errors
+    /// Those of [`Self::bake_textures`], and of `kept`.
+    pub fn bake_textures_in_parts(
+        &self,
+        planned: &[PlannedTexture],
+        mut kept: Option<&mut KeptParts>,
+        control: &mut dyn Control,
+    ) -> Result<Vec<BakedMap>> {
+        // textures, or each material of a texture where that decides what occludes
+        let materials = |number: usize| -> Vec<(usize, Option<usize>)> {
+            match self.settings.occluders {
+                Occluders::Scene => vec![(number, None)],
+                Occluders::Material => (0..planned[number].materials.len()).map(|m| (number, Some(m))).collect(),
+            }
+        };
+        let jobs: Vec<(usize, Option<usize>)> = (0..planned.len()).flat_map(materials).collect();
+        let meshes = |(number, material): &(usize, Option<usize>)| -> Vec<usize> {
+            let surfaces = planned[*number].surfaces.iter();
+            surfaces.filter(|s| material.is_none_or(|m| s.material == m)).map(|s| s.mesh).collect()
+        };
+        let groups: Vec<Vec<usize>> = jobs.iter().map(meshes).collect();
+
+        // one after the other
+        let (mut maps, mut under_way) = (Vec::new(), None);
         let share = u64::from(self.settings.spp) << 20;
         self.with_each(&groups, share, control, |flat, tracer, nth, control| {
+            let (number, material) = jobs[nth];
             let traced = Traced { scene: flat.scene, tracer, flat, cage: self.detailed.map(|d| d.cage) };
-            maps.push(map::bake(self.scene, traced, &planned[nth], self.settings, control)?);
+            let begin = || TextureBake::new(self.scene, &planned[number], self.settings);
+            let mut bake = under_way.take().unwrap_or_else(begin);
+            bake.sample(traced, material, kept.as_deref_mut(), control)?;
+            if jobs.get(nth + 1).is_some_and(|next| next.0 == number) {
+                under_way = Some(bake);
+            } else {
+                maps.push(bake.finish());
+            }
             Ok(())
         })?;
         Ok(maps)
+    }
+
+    /// 32 hexadecimal digits that stand for all that the values of textures depend on: scenes,
+    /// settings, the device, and where surfaces lie in the textures.
+    pub fn fingerprint(&self, planned: &[PlannedTexture]) -> String {
+        let mut hash = Xxh3::new();
+        let add = |hash: &mut Xxh3, text: &str| {
+            hash.update(&(text.len() as u64).to_le_bytes());
+            hash.update(text.as_bytes());
+        };
+        add(&mut hash, env!("CARGO_PKG_VERSION"));
+        let Self { settings, tracing, device, .. } = self;
+        add(&mut hash, &format!("{settings:?} {tracing:?} {} {}", device.info.name, device.info.driver));
+
+        // scenes
+        let cage = self.detailed.map(|detailed| detailed.cage);
+        let cage_model = if let Some(Cage::Model(model)) = cage { Some(model) } else { None };
+        let other = self.detailed.map(|detailed| detailed.scene).into_iter().chain(cage_model).chain(self.occluding);
+        for scene in std::iter::once(self.scene).chain(other) {
+            add(&mut hash, &fingerprint::of_scene(scene));
+            add(&mut hash, &fingerprint::of_environment(&scene.environment));
+        }
+        if let Some(Cage::Distance(distance)) = cage {
+            add(&mut hash, &distance.to_bits().to_string());
+        }
+
+        // textures
+        for texture in planned {
+            add(&mut hash, &format!("{:?} {} {:?}", texture.size, texture.texcoord, texture.tile));
+            for surface in &texture.surfaces {
+                add(&mut hash, &format!("{} {} {:?}", surface.mesh, surface.material, surface.instances));
+                hash.update(bytemuck::cast_slice(surface.corners.as_flattened()));
+            }
+        }
+        format!("{:032x}", hash.digest128())
     }
 
     /// Bakes the vertices of each mesh that has a primitive in the file; also the number of rays.

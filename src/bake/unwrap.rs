@@ -46,8 +46,8 @@ pub struct UnwrappedMesh {
     pub scene_corners: Vec<[Vec2; 3]>,
 }
 
-/// Makes texture coordinates for meshes that share a texture; `control` hears of the stage under
-/// way.
+/// Makes texture coordinates for meshes that share a texture, which `label` names in messages;
+/// `control` hears of the stage under way.
 ///
 /// # Errors
 /// [`Error::Interrupted`], and [`Error::Usage`] if a texture of that size has no room for all
@@ -57,10 +57,10 @@ pub fn unwrap(
     file: &SourceFile,
     meshes: &[usize],
     settings: &BakeSettings,
-    name: &str,
+    label: &str,
     control: &mut dyn Control,
 ) -> Result<Unwrapped> {
-    let failed = |reason: String| Error::Usage(format!("material `{name}` cannot be unwrapped: {reason}"));
+    let failed = |reason: String| Error::Usage(format!("{label} cannot be unwrapped: {reason}"));
 
     // the primitives as the file has them, at the scale of their largest instance
     let mut sources = Vec::new();

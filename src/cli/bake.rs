@@ -11,27 +11,21 @@ use serde_json::json;
 use super::args::LoadArgs;
 use crate::bake::cage::{Cage, Detailed, check as check_cage};
 use crate::bake::document::TextureImages;
+use crate::bake::kept::KeptParts;
 use crate::bake::map::BakedMap;
+use crate::bake::options::{BakeOptions, CompleteOptions};
 use crate::bake::picture::{self, Bits};
 use crate::bake::plan::{PlannedTexture, plan};
 use crate::bake::seams::Seams;
 use crate::bake::session::BakeSession;
-use crate::bake::{
-    BakeSettings, LightSettings, Map, Occluders, SeamTreatment, Space, Target, TexcoordChoice, agreement, document,
-    pack, udim,
-};
+use crate::bake::{Map, Occluders, SeamTreatment, Target, agreement, document, pack, udim};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
-use crate::integrators::IntegratorName;
-use crate::integrators::ao::{Hemisphere, Occlusion};
-use crate::integrators::lighting::LightingSettings;
-use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::export::{AmendedFile, export_gltf};
 use crate::scene::load::{LoadOptions, is_scene_file, load_with};
-use crate::scene::{Scene, SceneSettings};
+use crate::scene::{LoadReport, Scene, SceneSettings};
 use crate::settings::Length;
-use crate::settings::parse::parse_falloff;
 use crate::terminal::console::Verbosity;
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
@@ -40,14 +34,13 @@ use crate::tracer::DeviceSettings;
 
 const EXAMPLES: &str = "Examples:
   skylit bake model.glb -o model-ao.glb                        an occlusion texture for each material, all else kept
+  skylit bake model.glb -o model-ao.glb --atlas                one texture for all materials
   skylit bake model.glb -o model-vc.glb --to vertices          colours of vertices instead
   skylit bake model.glb -o bent.png --map bent-normal --space tangent --size 2048
   skylit bake low.glb -o normals.png --from high.glb --map normal --space tangent
   skylit bake model.obj -o thickness.exr --map thickness --ao-radius 10%
   skylit bake room.glb -o light.exr --map light --environment sky --denoise";
 
-/// Largest width and height of a texture.
-const MAX_SIZE: u32 = 16384;
 /// Largest number of samples of a triangle's corner.
 const MAX_CORNER_SPP: u32 = 1024;
 
@@ -61,41 +54,9 @@ pub struct BakeArgs {
     /// File to write: the model with the results in it (.glb, .gltf), or an image of a map (.png, .exr)
     #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub output: PathBuf,
-    /// Property of the surfaces
-    #[arg(long, value_enum, default_value = "ao")]
-    pub map: Map,
     /// Where the results go in a model
     #[arg(long, value_enum, default_value = "texture")]
     pub to: Target,
-    /// Width and height of textures in texels, WIDTHxHEIGHT or one number
-    #[arg(long, value_name = "SIZE", default_value = "1024", value_parser = parse_size)]
-    pub size: [u32; 2],
-    /// Samples per texel, or per corner of a triangle with --to vertices; rounded up to a power of two
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub spp: u32,
-    /// More samples for texels whose standard error is larger, 64 times --spp at most
-    #[arg(long, value_name = "ERROR", value_parser = parse_error)]
-    pub target_error: Option<f64>,
-    /// Integrator of --map light: path, direct, whitted or ao-sky [default: path]
-    #[arg(long, value_name = "NAME", value_parser = str::parse::<IntegratorName>)]
-    pub integrator: Option<IntegratorName>,
-    /// Maximum path length of --map light in bounces; 1 is direct light [default: no limit]
-    #[arg(long, value_name = "N")]
-    pub max_depth: Option<u32>,
-    /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u32,
-    /// Radius of occlusion [default: that of `render`; of thickness 10%, of curvature 1%]
-    ///
-    /// Hits beyond do not occlude. Of thickness and curvature it is the length of rays.
-    #[arg(long, value_name = "R|PERCENT%|auto", value_parser = str::parse::<Length>)]
-    pub ao_radius: Option<Length>,
-    /// Falloff: a hit at distance d occludes by C^-d; 1 is binary [default: 1]
-    #[arg(long, value_name = "C", value_parser = parse_falloff)]
-    pub ao_falloff: Option<f64>,
-    /// Normal of the hemisphere
-    #[arg(long, value_enum, default_value = "geometric")]
-    pub ao_normal: Hemisphere,
     /// What occludes: the scene, the meshes of the surface's material, or also a model
     ///
     /// `scene` or `material` and any number of models (.gltf, .glb, .obj, .brhan) may be given. A model occludes besides, where its file places it, and is not baked.
@@ -112,37 +73,11 @@ pub struct BakeArgs {
     /// The model is an inflated copy of this one, with the same triangles in the same order. Rays start at its surface, go through that of this one, and end as far behind.
     #[arg(long, value_name = "D|PERCENT%|MODEL", value_parser = str::parse::<CageArg>, requires = "from")]
     pub cage: Option<CageArg>,
-    /// A ground plane under the scene occludes, too
-    #[arg(long)]
-    pub ground: bool,
-    /// Texture coordinates: the number of a set, `unwrap` for new ones, or `auto`
+    /// Bake a texture for each instance of a mesh
     ///
-    /// `auto` takes set 1 or 0 if no two places share a texel, else new ones.
-    #[arg(long, value_name = "auto|N|unwrap", default_value = "auto", value_parser = str::parse::<TexcoordChoice>)]
-    pub texcoord: TexcoordChoice,
-    /// Texels around charts that get the value of the nearest covered texel [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=16384))]
-    pub padding: Option<u32>,
-    /// Filter noise in the texture, not across edges or charts (biased)
-    #[arg(long)]
-    pub denoise: bool,
-    /// Edges whose two sides lie apart in the texture
-    #[arg(long, value_enum, default_value = "leave")]
-    pub seams: SeamTreatment,
-    /// Coordinates of directions and positions
-    #[arg(long, value_enum, default_value = "world")]
-    pub space: Space,
-    /// Average over all instances of a mesh, not the first alone
-    #[arg(long)]
-    pub average_instances: bool,
-    /// Bake a texture for each instance of a mesh, as an image of its own
-    ///
-    /// The first image shows the first instance of each mesh, the second the second of those that have one, and so on: NAME-1.png, NAME-2.png.
+    /// In a model each instance after the first gets a copy of the mesh, which shares its vertices, and of its materials. Images are NAME-1.png, NAME-2.png: the first shows the first instance of each mesh, the second the second of those that have one, and so on.
     #[arg(long, conflicts_with = "average_instances")]
     pub unique_instances: bool,
-    /// Bake this material alone; may be given several times [default: all]
-    #[arg(long, value_name = "NAME")]
-    pub only_material: Vec<String>,
     /// Bits of a channel of PNG files and of textures in a model
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = parse_bits)]
     pub bits: Bits,
@@ -151,12 +86,17 @@ pub struct BakeArgs {
     /// It is done where a material has them by the same coordinates.
     #[arg(long, value_name = "orm", value_parser = ["orm"])]
     pub pack: Option<String>,
+    /// Keep finished parts beside the output until it is written: the same command goes on with them
+    ///
+    /// They are in NAME.parts. The result has the bits of a bake that was not interrupted.
+    #[arg(long)]
+    pub resumable: bool,
     /// Render the model with baked and with traced ambient occlusion, and report their difference
     #[arg(long)]
     pub verify: bool,
-    /// Light of --map light
+    /// What is baked, and at last its light, whose heading would hold what follows
     #[command(flatten)]
-    pub lighting: LightingSettings,
+    pub what: BakeOptions,
     /// Files of the scene
     #[command(flatten)]
     pub load: LoadArgs,
@@ -169,18 +109,6 @@ pub struct BakeArgs {
     /// How results are shown
     #[command(flatten)]
     pub verbosity: Verbosity,
-}
-
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once('x').unwrap_or((text, text));
-    let side = |t: &str| t.trim().parse().ok().filter(|n| (1..=MAX_SIZE).contains(n));
-    let size = side(width).zip(side(height)).map(|(w, h)| [w, h]);
-    size.ok_or_else(|| format!("expected texels, WIDTHxHEIGHT or one number from 1 to {MAX_SIZE}"))
-}
-
-fn parse_error(text: &str) -> Result<f64, String> {
-    let error = text.trim().parse().ok().filter(|e: &f64| *e > 0.0 && *e < 1.0);
-    error.ok_or_else(|| "expected a number between 0 and 1".to_owned())
 }
 
 /// The value of `--occluders`.
@@ -286,11 +214,10 @@ fn check(args: &BakeArgs) -> Result<Output> {
     // options that do not go together, and the remedy
     let (is_image, to_vertices) = (output == Output::Image, args.to == Target::Vertices);
     let is_packed = args.pack.is_some();
-    let is_light = args.map == Map::Light;
-    let has_path_options = args.integrator.is_some() || args.max_depth.is_some();
+    let is_light = args.what.map == Map::Light;
     let refusals = [
         (
-            !is_image && args.map != Map::Ao,
+            !is_image && args.what.map != Map::Ao,
             "--map: a model holds ambient occlusion alone; write an image, .png or .exr",
         ),
         (is_image && to_vertices, "--to vertices: an image has no vertices; write a model, .glb or .gltf"),
@@ -302,43 +229,37 @@ fn check(args: &BakeArgs) -> Result<Output> {
             args.occluders.iter().filter(|o| matches!(o, OccludersArg::Scene(_))).count() > 1,
             "--occluders: scene or material, not both, and any number of models",
         ),
-        (
-            args.unique_instances && !is_image,
-            "--unique-instances is for images, since a model's instances share textures: write one, .png or .exr",
-        ),
+        (args.unique_instances && to_vertices, "--unique-instances is for textures: instances share their vertices"),
         (matches!(args.cage, Some(CageArg::Distance(Length::Auto))), "--cage: a length or a share is expected"),
         (
-            args.target_error.is_some() && (to_vertices || !args.map.is_sampled() || is_light),
+            args.what.target_error.is_some() && to_vertices,
             "--target-error is for textures of what rays sample, but for light",
-        ),
-        (
-            is_light
-                && (args.ao_radius.is_some() || args.ao_falloff.is_some() || args.ao_normal != Hemisphere::default()),
-            "--ao-radius, --ao-falloff and --ao-normal have no effect on --map light",
         ),
         (
             is_light && args.own_occluders() != Occluders::Scene,
             "--occluders material: light comes from the whole scene with --map light",
         ),
+        (args.what.denoise && to_vertices, "--denoise is for textures: vertices are the means of their triangles"),
         (
-            !is_light && (args.lighting != LightingSettings::default() || has_path_options),
-            "--environment, --light, --integrator and --max-depth are for --map light",
+            args.what.seams == SeamTreatment::Match && to_vertices,
+            "--seams match is for textures: vertices at one place have one value",
         ),
-        (args.denoise && to_vertices, "--denoise is for textures: vertices are the means of their triangles"),
+        (args.what.atlas && to_vertices, "--atlas is for textures: colours of vertices need none"),
+        (args.what.atlas && args.unique_instances, "--atlas: instances that have a texture each do not share one"),
         (
-            args.seams == SeamTreatment::Match
-                && (to_vertices || (args.map.is_vector() && args.space == Space::Tangent)),
-            "--seams match is for textures, and not for directions in tangent space, which turns at a seam",
+            args.what.atlas && is_packed,
+            "--pack orm: roughness of several materials lies in several textures, not in an atlas",
         ),
+        (args.resumable && to_vertices, "--resumable is for textures: vertices are baked at once"),
         (is_packed && (is_image || to_vertices), "--pack orm is for textures of a model"),
         (is_packed && args.bits == Bits::Sixteen, "--pack orm: packed textures have 8 bits a channel"),
         (is_image && args.verify, "--verify renders the written model: write one, .glb or .gltf"),
-        (to_vertices && args.spp > MAX_CORNER_SPP, "--spp: corners of triangles have at most 1024 samples"),
+        (to_vertices && args.what.spp > MAX_CORNER_SPP, "--spp: corners of triangles have at most 1024 samples"),
         (args.verify && to_vertices, "--verify is for textures: colours of vertices are not rendered apart"),
     ];
     match refusals.into_iter().find(|(is_refused, _)| *is_refused) {
         Some((_, reason)) => Err(Error::Usage(reason.to_owned())),
-        None => Ok(output),
+        None => args.what.check().map(|()| output),
     }
 }
 
@@ -356,6 +277,9 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     args.occluding_models().for_each(|model| files_plan.reads("--occluders", model));
     args.cage_model().iter().for_each(|cage| files_plan.reads("--cage", cage));
     files_plan.writes("the output", &args.output);
+    if args.resumable {
+        files_plan.writes("its finished parts", parts_path(&args.output));
+    }
     files_plan.check()?;
     files::check_writable(&args.output)?;
 
@@ -364,7 +288,9 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     let mut warnings = Warnings::new(console);
     renderer.scene().report.all_warnings().iter().for_each(|w| warnings.add(w));
     files_plan.check_scene(&renderer.scene().report.files)?;
-    let (settings, remarks, lighting) = settings(args, &mut renderer)?;
+    let CompleteOptions { mut settings, remarks, lighting } = args.what.complete(&mut renderer, &args.meaning)?;
+    settings.occluders = args.own_occluders();
+    settings.has_unique_instances = args.unique_instances;
     let device = renderer.device().clone();
     let mut scene = renderer.into_scene();
     let model = ModelFile::open(args, output, &mut scene)?;
@@ -413,6 +339,8 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     }
     let unpacked = planned.iter().filter(|_| args.pack.is_some()).filter_map(|t| pack::partner(&scene, t).err());
     unpacked.for_each(|reason| warnings.add(&reason));
+    let copied = model.as_ref().map_or_else(Vec::new, |m| document::remarks_on_copies(&m.file, &planned));
+    copied.iter().for_each(|remark| warnings.add(remark));
 
     // the maps, or the values of vertices
     let cage = match &cage_model {
@@ -429,12 +357,12 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     };
     let mut control = ProgressControl { progress: Progress::new("baking", &console), keep_partial: false };
     let mut record = json!({
-        "scene": args.scene, "map": args.map.name(), "to": args.to.name(),
+        "scene": args.scene, "map": args.what.map.name(), "to": args.to.name(),
         "ao_radius": settings.occlusion.radius, "spp": settings.spp,
     });
-    if args.map == Map::Light {
+    if args.what.map == Map::Light {
         record["integrator"] = json!(settings.light.integrator()?.name());
-        record["max_depth"] = json!(args.max_depth);
+        record["max_depth"] = json!(args.what.max_depth);
     }
     let (written, what, rays) = bake_and_write(args, &session, model, planned, paths, &mut record, &mut control)?;
     drop(control);
@@ -480,8 +408,11 @@ fn bake_and_write(
             record["vertices"] = json!(count);
             Ok((document::save_vertices(model.file, &baked, &args.output)?, format!("{count} vertices"), rays))
         }
+
+        // the maps, of which some parts may be there
         (Target::Texture, model) => {
-            let maps = session.bake_textures(&planned, control)?;
+            let mut kept = args.resumable.then(|| parts_of(args, session, &planned)).transpose()?;
+            let maps = session.bake_textures_in_parts(&planned, kept.as_mut(), control)?;
             let rays = maps.iter().map(|m| m.rays).sum();
             record["textures"] = planned.iter().zip(&maps).map(|(t, m)| texture_record(t, m)).collect();
             let what = describe(&maps);
@@ -498,9 +429,27 @@ fn bake_and_write(
                     paths
                 }
             };
+            kept.map(KeptParts::remove).transpose()?;
             Ok((written, what, rays))
         }
     }
+}
+
+/// The file of finished parts, beside the output.
+fn parts_path(output: &Path) -> PathBuf {
+    let mut name = output.file_name().unwrap_or_default().to_owned();
+    name.push(".parts");
+    output.with_file_name(name)
+}
+
+/// Opens the file of finished parts, and says so where it has some.
+fn parts_of(args: &BakeArgs, session: &BakeSession, planned: &[PlannedTexture]) -> Result<KeptParts> {
+    let path = parts_path(&args.output);
+    let kept = KeptParts::open(&path, &session.fingerprint(planned), session.settings.is_smoothed)?;
+    if kept.is_continued() {
+        args.verbosity.console().line(&format!("goes on with the finished parts in {}", path.display()))?;
+    }
+    Ok(kept)
 }
 
 /// The file that a model is written into.
@@ -542,74 +491,9 @@ fn as_gltf(scene: &mut Scene) -> Result<(tempfile::TempDir, PathBuf)> {
     export_gltf(scene, &path)?;
     let (name, report) = (scene.name.clone(), scene.report.clone());
     *scene = load_with(&path.to_string_lossy(), &LoadOptions::default())?;
-    (scene.name, scene.report) = (name, report);
+    let instance_nodes = std::mem::take(&mut scene.report.instance_nodes);
+    (scene.name, scene.report) = (name, LoadReport { instance_nodes, ..report });
     Ok((folder, path))
-}
-
-/// The settings of baking, with a radius in scene units, sentences on what was chosen, and the
-/// light besides the scene's.
-fn settings(args: &BakeArgs, renderer: &mut Renderer) -> Result<(BakeSettings, Vec<String>, LightingSettings)> {
-    renderer.apply_scene_settings(&args.meaning)?;
-    let bounds = renderer.scene().bounds();
-    let diagonal = bounds.map_or(1.0, |(low, high)| (high - low).length());
-    let mut remarks = Vec::new();
-
-    // a light map has the light of a render
-    let light = LightSettings { integrator: args.integrator, max_depth: args.max_depth };
-    let mut lighting = args.lighting.clone();
-    if args.map == Map::Light {
-        let (scene, integrator) = (args.meaning.clone(), Some(light.integrator()?));
-        let mut settings =
-            RenderSettings { scene, integrator, lighting: lighting.clone(), ..RenderSettings::default() };
-        settings.integrators.path.max_depth = args.max_depth;
-        settings.check()?;
-        let completed = renderer.complete(&settings, None)?;
-        remarks.extend(completed.choices.into_iter().filter(|line| line.starts_with("light")));
-        if completed.chosen.lighting != LightingSettings::default() {
-            lighting = completed.chosen.lighting;
-        }
-    }
-
-    // the radius of ambient occlusion is chosen as that of a render
-    let own = args.map.default_radius().map(Length::OfDiagonal);
-    let unlimited = (args.map == Map::Light).then_some(Length::Units(f64::INFINITY));
-    let wanted = args.ao_radius.or(own).or(unlimited);
-    let radius = match wanted.and_then(|length| length.units(diagonal)) {
-        Some(units) => units,
-        None => {
-            let mut settings = RenderSettings { scene: args.meaning.clone(), ..RenderSettings::default() };
-            settings.integrators.ao.ao_radius = wanted;
-            let completed = renderer.complete(&settings, None)?;
-            remarks.extend(completed.choices.into_iter().filter(|line| line.starts_with("AO radius")));
-            completed.settings.integrators.ao.radius()
-        }
-    };
-    if own.is_some() && !radius.is_finite() {
-        return Err(Error::Usage(format!("--ao-radius {radius}: --map {} needs a length, as 10%", args.map.name())));
-    }
-    let settings = BakeSettings {
-        map: args.map,
-        size: args.size,
-        spp: args.spp,
-        target_error: args.target_error,
-        seed: args.seed,
-        occlusion: Occlusion { radius, falloff: args.ao_falloff.unwrap_or(1.0), hemisphere: args.ao_normal },
-        occluders: args.own_occluders(),
-        has_ground: args.ground,
-        texcoords: args.texcoord,
-        padding: args.padding.map_or(f64::INFINITY, f64::from),
-        is_smoothed: args.denoise,
-        seams: args.seams,
-        space: args.space,
-        averages_instances: args.average_instances,
-        has_unique_instances: args.unique_instances,
-        materials: args.only_material.clone(),
-        light,
-    };
-    if renderer.scene().rig.is_some() {
-        remarks.push("the scene is animated: its rest pose is baked".to_owned());
-    }
-    Ok((settings, remarks, lighting))
 }
 
 /// The distance from surfaces within which those of a detailed model are looked for, scene units.
@@ -670,6 +554,7 @@ fn texture_record(texture: &PlannedTexture, map: &BakedMap) -> serde_json::Value
     let covered = map.covered.iter().filter(|c| **c).count();
     json!({
         "material": texture.name,
+        "materials": texture.materials.iter().map(|m| &m.name).collect::<Vec<_>>(),
         "size": map.size,
         "texcoord": texture.texcoord,
         "tile": texture.tile.and_then(udim::number),

@@ -74,6 +74,9 @@ pub struct LoadReport {
     pub options: Vec<String>,
     /// Names and texts of what a glTF file says of itself (KHR_xmp_json_ld).
     pub metadata: Vec<(String, String)>,
+    /// Index of the node of a glTF file that each instance came from, in the order of
+    /// [`Scene::instances`]; empty for other formats.
+    pub instance_nodes: Vec<usize>,
     /// Names of the scenes of a glTF file, of which one is loaded.
     pub scenes: Vec<String>,
     /// Extensions that a glTF file names.

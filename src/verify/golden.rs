@@ -193,6 +193,9 @@ impl Golden {
 /// The picture of an image as the frame's settings show it, with linear values.
 pub fn shown_image(frame: &Frame, image: &Image) -> Image {
     let settings = &frame.settings;
+    if let Some(baked) = &frame.baked {
+        return baked.shown_image(image);
+    }
     match settings.realtime_setting() {
         // ambient visibility is shown as it is
         Some(_) if settings.integrator().can(Capability::AmbientVisibility) => {

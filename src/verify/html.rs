@@ -117,7 +117,8 @@ fn with_text(mut section: Section, text: &str, frame: Option<&Frame>, result: &F
     section.parts.insert(0, Part::Text(text.to_owned()));
     if let Some(frame) = frame {
         let chosen = result.chosen.as_ref().map_or_else(String::new, |options| format!(" {options}"));
-        section.parts.insert(1, Part::Text(format!("skylit render {} {}{chosen}", frame.scene, frame.render_text())));
+        let text = format!("skylit {} {} {}{chosen}", frame.command(), frame.scene, frame.render_text());
+        section.parts.insert(1, Part::Text(text));
     }
     section
 }

@@ -129,7 +129,7 @@ fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
     }
     // all pixels of a still get the same samples, but where they stop once they are good enough
     let samples = image.channels.iter().find(|c| c.name == "samples").map(|c| &c.samples);
-    let is_still = frame.settings.realtime_setting().is_none();
+    let is_still = frame.settings.realtime_setting().is_none() && frame.baked.is_none();
     let film = &frame.settings.film;
     let is_even = is_still && film.target_rmse.is_none() && film.quality.is_none();
     if let (Some(Samples::F32(samples)), true) = (samples, is_even) {

@@ -9,9 +9,11 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::baked::BakedFrame;
 use super::tolerance::Tolerance;
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
+use crate::integrators::lighting::LightingSettings;
 use crate::renderer::RenderSettings;
 use crate::scene::builtin;
 use crate::scene::load::{Confine, GeometryOptions, LoadOptions, Projection, UpAxis, confine};
@@ -53,6 +55,8 @@ pub struct Frame {
     pub settings_file: Option<PathBuf>,
     /// The settings; files are paths from the folder. [`Manifest::settings`] has them as they are.
     pub settings: RenderSettings,
+    /// The map that is baked in place of a render, if it is one.
+    pub baked: Option<BakedFrame>,
     pub tracers: Tracers,
     /// The differences that are allowed.
     pub tolerance: Tolerance,
@@ -143,6 +147,7 @@ struct Entry {
     uv: Option<Spanned<String>>,
     up_axis: Option<Spanned<String>>,
     render: Option<Spanned<String>>,
+    bake: Option<Spanned<String>>,
     settings: Option<Spanned<PathBuf>>,
     tracers: Option<Spanned<Vec<String>>>,
     tolerance: Option<Tolerance>,
@@ -283,6 +288,9 @@ impl Manifest {
         plan.reads("the manifest", self.folder.join(NAME));
         for frame in &self.frames {
             let settings = self.settings(frame);
+            let baked = self.baked(frame);
+            let of_light_map = baked.as_ref().and_then(|baked| baked.options.lighting.environment_file());
+            of_light_map.iter().for_each(|path| plan.reads_images("an environment", path));
             if !frame.scene.starts_with(BUILTIN) {
                 plan.reads("a scene", self.scene(frame));
             }
@@ -307,14 +315,26 @@ impl Manifest {
     /// The settings of a frame, with files that it names found from the folder.
     pub fn settings(&self, frame: &Frame) -> RenderSettings {
         let mut settings = frame.settings.clone();
-        let environment = settings.lighting.environment_file().map(|path| self.folder.join(path));
-        if let Some(path) = environment.filter(|path| path.exists()) {
-            settings.lighting.environment = Some(path.to_string_lossy().into_owned());
-        }
+        self.find_environment(&mut settings.lighting);
         if let Some(path) = &mut settings.frames.camera_path {
             *path = self.folder.join(&*path);
         }
         settings
+    }
+
+    /// The map that a frame is, with files that it names found from the folder.
+    pub fn baked(&self, frame: &Frame) -> Option<BakedFrame> {
+        let mut baked = frame.baked.clone()?;
+        self.find_environment(&mut baked.options.lighting);
+        Some(baked)
+    }
+
+    /// Has an environment's file be found from the folder.
+    fn find_environment(&self, lighting: &mut LightingSettings) {
+        let environment = lighting.environment_file().map(|path| self.folder.join(path));
+        if let Some(path) = environment.filter(|path| path.exists()) {
+            lighting.environment = Some(path.to_string_lossy().into_owned());
+        }
     }
 
     /// Images in the folder that are no frame's.
@@ -329,7 +349,12 @@ impl Manifest {
 }
 
 impl Frame {
-    /// The settings as options of `skylit render`; the seed is left out where any will do.
+    /// The command that makes it: `skylit render` or `skylit bake`.
+    pub fn command(&self) -> &'static str {
+        if self.baked.is_some() { "bake" } else { "render" }
+    }
+
+    /// The settings as options of that command; the seed is left out where any will do.
     pub fn render_text(&self) -> String {
         let mut settings = self.settings.clone();
         if self.tolerance.allows_other_seeds() {
@@ -337,7 +362,11 @@ impl Frame {
         }
         let load = self.load_options(Confine::Nowhere).flags();
         let quoted = |word: String| shlex::try_quote(&word).map_or_else(|_| word.clone(), |quoted| quoted.into_owned());
-        load.into_iter().map(quoted).chain(settings.flags()).collect::<Vec<_>>().join(" ")
+        let own = match &self.baked {
+            Some(baked) => vec![baked.words.clone()],
+            None => settings.flags(),
+        };
+        load.into_iter().map(quoted).chain(own).collect::<Vec<_>>().join(" ")
     }
 
     /// How its scene is loaded. `confine`: where the files must lie that it refers to.
@@ -372,6 +401,7 @@ fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<En
         geometry: GeometryOptions::default(),
         settings_file: entry.settings.as_ref().map(|file| folder.join(file.get_ref())),
         settings: RenderSettings::default(),
+        baked: None,
         tracers: Tracers::Auto,
         tolerance: entry.tolerance.or(defaults.tolerance).unwrap_or_default(),
         format: entry.golden.or(defaults.golden).unwrap_or_default(),
@@ -430,9 +460,13 @@ fn complete(
         );
     }
     frame.geometry = geometry(source, entry)?;
-    frame.settings = settings(source, folder, defaults, entry)?;
+    match &entry.bake {
+        Some(words) => frame.baked = Some(baked(source, entry, words)?),
+        None => frame.settings = settings(source, folder, defaults, entry)?,
+    }
     let golden = folder.join(format!("{}.{}", frame.name, frame.format.extension()));
-    let environment = frame.settings.lighting.environment_file();
+    let lighting = frame.baked.as_ref().map_or(&frame.settings.lighting, |baked| &baked.options.lighting);
+    let environment = lighting.environment_file();
     let named = environment.iter().chain(&frame.settings.frames.camera_path).map(|path| folder.join(path));
     named.chain([golden]).try_for_each(|path| source.check_confined(span.clone(), &path))?;
     let tracers = entry.tracers.as_ref().or(defaults.tracers.as_ref());
@@ -491,6 +525,15 @@ fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) 
     Ok(settings)
 }
 
+/// The map that a frame is in place of a render.
+fn baked(source: &Source, entry: &Entry, words: &Spanned<String>) -> Result<BakedFrame> {
+    if entry.render.is_some() || entry.settings.is_some() {
+        let message = "bake: a frame is baked or rendered: leave render and settings out, or bake";
+        return Err(source.error(words.span(), message));
+    }
+    BakedFrame::parse(words.get_ref()).map_err(|e| source.error(words.span(), e))
+}
+
 /// Parses names of tracers: `auto`, `all`, or some of them.
 ///
 /// # Errors
@@ -531,11 +574,16 @@ fn check(frame: &Frame) -> std::result::Result<(), String> {
             "the last of its frames is compared, and up to {MAX_FRAMES} are rendered for it: use fewer --frames or less --warm-up"
         ));
     }
+
+    // a Z-test needs to know the noise
     if tolerance.z_test.is_none() {
         return Ok(());
     }
     if frame.format == GoldenFormat::Png {
         return wrong("a PNG has no variances, which a Z-test needs: leave golden = \"png\" out, or use flip");
+    }
+    if let Some(fault) = frame.baked.as_ref().and_then(BakedFrame::fault_of_z_test) {
+        return wrong(fault);
     }
     if let Some(setting) = settings.realtime_setting() {
         return Err(format!(
@@ -596,6 +644,30 @@ mod tests {
             assert!(problem.contains(why), "{keys}: {problem}");
         }
         assert!(frame("uv = true").unwrap_err().to_string().contains("line 1"));
+    }
+
+    /// A frame may be baked in place of rendered, by options of its own.
+    #[test]
+    fn baked_maps_are_frames() {
+        let dir = tempfile::tempdir().unwrap();
+        let frame = |keys: &str| {
+            let text = format!("frame = [{{ name = \"a\", scene = \"builtin:plane\", {keys} }}]");
+            std::fs::write(dir.path().join(NAME), text).unwrap();
+            Manifest::load(dir.path()).unwrap().frames[0].clone()
+        };
+        let sound = frame("bake = \"--map ao  --size 64\", uv = \"box\", tolerance = \"z_test\"");
+        assert_eq!((sound.problem.as_ref(), sound.command()), (None, "bake"));
+        assert_eq!(sound.render_text(), "--uv box --map ao --size 64");
+        for (keys, why) in [
+            ("bake = \"\", render = \"ao\"", "line 1: bake: a frame is baked or rendered"),
+            ("bake = \"--map lights\"", "line 1: \"--map lights\": "),
+            ("bake = \"--map light\", tolerance = \"z_test\"", "only ao and thickness have variances"),
+            ("bake = \"\", golden = \"png\", tolerance = \"z_test\"", "a PNG has no variances"),
+            ("bake = \"\"", "a has no tolerance"),
+        ] {
+            let problem = frame(keys).problem.unwrap();
+            assert!(problem.contains(why), "{keys}: {problem}");
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! [`judge`] compares by a [`tolerance`], [`bless`] makes [`golden`] images; [`junit`] writes
 //! results for CI servers, [`html`] for people. docs/guide/ci.md is for users.
 
+pub mod baked;
 pub mod bless;
 pub mod golden;
 pub mod html;

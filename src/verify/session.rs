@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::baked::{self, BakedFrame};
 use super::golden::Golden;
 use super::manifest::{Frame, Manifest, Tracers};
 use crate::error::{Error, Result};
@@ -64,6 +65,9 @@ impl<'m> VerifySession<'m> {
         golden: Option<&Golden>,
         control: &mut dyn Control,
     ) -> Result<Image> {
+        if let Some(baked) = self.manifest.baked(frame) {
+            return self.bake(frame, kind, baked, seed, golden, control);
+        }
         let mut settings = self.manifest.settings(frame);
         settings.image.seed = seed.or(settings.image.seed);
         let renderer = self.renderer(frame, kind)?;
@@ -78,16 +82,29 @@ impl<'m> VerifySession<'m> {
         image
     }
 
+    /// Bakes the map that a frame is.
+    fn bake(
+        &mut self,
+        frame: &Frame,
+        kind: TracerKind,
+        BakedFrame { mut options, .. }: BakedFrame,
+        seed: Option<u32>,
+        golden: Option<&Golden>,
+        control: &mut dyn Control,
+    ) -> Result<Image> {
+        options.seed = seed.unwrap_or(options.seed);
+        // without the lights of the frame before
+        self.open = None;
+        let tracing = DeviceSettings { tracer: Some(choice(kind)), ..self.settings.clone() };
+        let renderer = self.renderer(frame, kind)?;
+        baked::bake(renderer, &tracing, &options, golden.map(|golden| &golden.image), control)
+    }
+
     pub fn load(&mut self, frame: &Frame, kind: TracerKind) -> Result<()> {
         self.renderer(frame, kind).map(drop)
     }
 
     fn renderer(&mut self, frame: &Frame, kind: TracerKind) -> Result<&mut Renderer> {
-        let choice = match kind {
-            TracerKind::Pipeline => TracerChoice::Pipeline,
-            TracerKind::Query => TracerChoice::Query,
-            TracerKind::Compute => TracerChoice::Compute,
-        };
         let confine = self.manifest.confine.as_deref().map_or(Confine::Nowhere, Confine::Folder);
         let is_scene = |open: &OpenRenderer| {
             open.scene == frame.scene && open.gltf_scene == frame.gltf_scene && open.geometry == frame.geometry
@@ -99,7 +116,7 @@ impl<'m> VerifySession<'m> {
                     Some(open) if is_scene(&open) => open.renderer.into_scene(),
                     _ => load::load_with(&self.manifest.scene(frame), &frame.load_options(confine))?,
                 };
-                let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
+                let settings = DeviceSettings { tracer: Some(choice(kind)), ..self.settings.clone() };
                 // the manifest's name: a golden image is the same whichever folder it was made in
                 let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
                 let (scene, gltf_scene) = (frame.scene.clone(), frame.gltf_scene.clone());
@@ -117,5 +134,14 @@ impl<'m> VerifySession<'m> {
     /// Fails if the validation layer, where it is on, has reported anything.
     pub fn check_validation(&self) -> Result<(), Error> {
         self.device.check_validation()
+    }
+}
+
+/// The setting that chooses a tracer.
+fn choice(kind: TracerKind) -> TracerChoice {
+    match kind {
+        TracerKind::Pipeline => TracerChoice::Pipeline,
+        TracerKind::Query => TracerChoice::Query,
+        TracerKind::Compute => TracerChoice::Compute,
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
+use super::bake_preview::{BakePreview, quick};
 use super::baking::{BakePlace, BakeWanted, BakedMap, BakedModel};
 use super::browse::Browsing;
 use super::camera::CameraControl;
@@ -59,6 +60,9 @@ const ANIMATION_FPS: f64 = 30.0;
 /// Width and height of a texture that is baked, texels, and samples: the defaults of `skylit bake`.
 const BAKE_SIZE: u32 = 1024;
 const BAKE_SPP: u32 = 64;
+/// Width and height of the picture of its preview, pixels, and samples of a pixel.
+const PREVIEW_SIZE: [u32; 2] = [420, 280];
+const PREVIEW_SPP: u32 = 16;
 /// Offset of the truth's seed from that of the images.
 const TRUTH_SEED: u32 = 0x7275_7468;
 
@@ -241,6 +245,8 @@ pub struct App {
     size: [u32; 2],
     layers: Vec<Layer>,
     pub renders: Vec<Render>,
+    /// The preview of the dialog *Bake*.
+    pub bake_preview: Option<BakePreview>,
     /// A model that was baked and is being opened.
     baked: Option<BakedModel>,
     /// The program that renders: this one.
@@ -315,6 +321,7 @@ impl App {
             size: [0; 2],
             layers: Vec::new(),
             renders: Vec::new(),
+            bake_preview: None,
             baked: None,
             program: std::env::current_exe().unwrap_or_else(|_| PathBuf::from("skylit")),
         };
@@ -473,6 +480,9 @@ impl App {
         self.receive(context);
         self.watch_files(context);
         self.watch_renders(context);
+        if let Some(preview) = &mut self.bake_preview {
+            preview.watch(context);
+        }
         self.advance(context);
         self.remember(context);
         self.layers.clear();
@@ -1320,17 +1330,15 @@ impl App {
             spp: BAKE_SPP,
             radius: self.settings.integrators.ao.radius(),
             share: None,
+            is_atlas: false,
             is_denoised: false,
             has_ground: false,
             is_shown: true,
         }
     }
 
-    /// Runs `skylit bake` with the scene as it is shown, as a program of its own.
-    pub fn bake(&mut self, output: &str, wanted: &BakeWanted) {
-        let Some(scene) = &self.scene else { return };
-        let source = scene.source.clone();
-
+    /// The arguments of `skylit bake` for the scene as it is shown.
+    fn bake_arguments(&self, source: &str, output: &str, wanted: &BakeWanted) -> Vec<String> {
         // what the view has of radius, falloff and light
         let mut settings = RenderSettings { scene: self.settings.scene.clone(), ..RenderSettings::default() };
         let falloff = self.settings.integrators.ao.ao_falloff;
@@ -1343,13 +1351,52 @@ impl App {
             settings.integrators.path.max_depth = self.settings.integrators.path.max_depth;
         }
 
-        // the program, and the model to show once it is there
-        let fixed = [source.clone(), "-o".into(), output.to_owned()];
-        let arguments = fixed.into_iter().chain(self.load_flags()).chain(wanted.flags()).chain(settings.flags());
-        let ao = (Length::Units(wanted.radius), falloff);
+        let fixed = [source.to_owned(), "-o".into(), output.to_owned()];
+        fixed.into_iter().chain(self.load_flags()).chain(wanted.flags()).chain(settings.flags()).collect()
+    }
+
+    /// Runs `skylit bake` with the scene as it is shown, as a program of its own.
+    pub fn bake(&mut self, output: &str, wanted: &BakeWanted) {
+        let Some(scene) = &self.scene else { return };
+        let source = scene.source.clone();
+        let arguments = self.bake_arguments(&source, output, wanted);
+        let ao = (Length::Units(wanted.radius), self.settings.integrators.ao.ao_falloff);
         let baked = BakedModel { source, output: output.to_owned(), place: wanted.place, ao, load: 0 };
         let is_shown = wanted.is_shown && wanted.place != BakePlace::Image;
-        self.start("bake", &arguments.collect::<Vec<_>>(), output, is_shown.then_some(baked));
+        self.start("bake", &arguments, output, is_shown.then_some(baked));
+    }
+
+    /// Starts the preview of a bake, in place of the one before.
+    pub fn preview_bake(&mut self, wanted: &BakeWanted) {
+        let Some(scene) = &self.scene else { return };
+        let (source, size, spp) = (scene.source.clone(), Some(PREVIEW_SIZE), Some(PREVIEW_SPP));
+        let settings = match self.render_settings(RenderedMotion::Nothing) {
+            Ok(settings) => settings,
+            Err(e) => return self.report(e.to_string(), true),
+        };
+        let arguments = |model: &str, picture: &str| {
+            let baked = BakedModel {
+                source: source.clone(),
+                output: model.to_owned(),
+                place: wanted.place,
+                ao: (Length::Auto, None),
+                load: 0,
+            };
+            // the file of an amended model says what that of the source says
+            let (scene, load) =
+                if baked.is_amended() { (settings.scene, self.load_flags()) } else { Default::default() };
+            let integrator = IntegratorName::find(baked.integrator());
+            let image = ImageSettings { size, spp, ..ImageSettings::default() };
+            let view =
+                RenderSettings { camera: settings.camera, scene, integrator, image, ..RenderSettings::default() };
+            let fixed = [model.to_owned(), "--no-config".into(), "-o".into(), picture.to_owned()];
+            let render = fixed.into_iter().chain(load).chain(view.flags()).collect();
+            [self.bake_arguments(&source, model, &quick(wanted)), render]
+        };
+        match BakePreview::start(self.program.clone(), wanted, arguments) {
+            Ok(preview) => self.bake_preview = Some(preview),
+            Err(e) => self.report(format!("no preview can be made: {e}"), true),
+        }
     }
 
     /// Opens a model that was baked, unless another scene was opened meanwhile.

@@ -88,6 +88,8 @@ pub struct BakeWanted {
     /// Length of the rays of thickness and curvature, as a share of the diagonal; `None`: that of
     /// the map.
     pub share: Option<f64>,
+    /// All materials share one texture.
+    pub is_atlas: bool,
     /// Noise is filtered.
     pub is_denoised: bool,
     /// A plane under the scene occludes, too.
@@ -140,6 +142,9 @@ impl BakeWanted {
         }
         if self.map().has_samples() {
             flags.extend(["--spp".to_owned(), self.spp.min(self.most_samples()).to_string()]);
+        }
+        if self.place == BakePlace::Texture && self.is_atlas {
+            flags.push("--atlas".to_owned());
         }
         if self.can_denoise() && self.is_denoised {
             flags.push("--denoise".to_owned());

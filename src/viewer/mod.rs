@@ -7,6 +7,7 @@
 //! same window, without any of these.
 
 pub mod app;
+pub mod bake_preview;
 pub mod baking;
 pub mod browse;
 pub mod camera;

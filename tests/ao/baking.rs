@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
+use skylit::Error;
 use skylit::bake::cage::{Cage, Detailed, check};
+use skylit::bake::kept::KeptParts;
 use skylit::bake::map::BakedMap;
 use skylit::bake::plan::{PlannedTexture, plan};
 use skylit::bake::session::BakeSession;
 use skylit::bake::texels::{Layout, TexelPoint};
 use skylit::bake::{BakeSettings, LightSettings, Map, Occluders, SeamTreatment, Space};
-use skylit::film::NoControl;
+use skylit::film::{Control, NoControl};
 use skylit::gpu::Device;
 use skylit::integrators::ao::Occlusion;
 use skylit::oracle::closed_form as exact;
@@ -303,6 +305,109 @@ fn gpu_bake_unique_instances() {
             baked.iter().map(|(t, m)| (t.placement, t.surfaces[0].instances[0], m.values[5].x)).collect();
         let [(Some(0), 0, dark), (Some(1), 2, open)] = found[..] else { panic!("{kind}: {found:?}") };
         assert!(dark < 0.01 && open > 0.99, "{kind}: {dark} {open}");
+    }
+}
+
+/// A floor in the left half of an atlas and a lid above it in the right half, of another material.
+fn floor_and_lid() -> Scene {
+    let mut floor = rectangle(Vec3::ZERO, Vec3::X, Vec3::NEG_Z);
+    let mut lid = rectangle(Vec3::new(0.0, 0.01, 0.0), Vec3::X * 9.0, Vec3::Z * 9.0);
+    floor.texcoords[0].iter_mut().for_each(|c| c.x *= 0.5);
+    lid.texcoords[0].iter_mut().for_each(|c| c.x = 0.5 * c.x + 0.5);
+    scene_of(vec![Geometry::Triangles(floor), Geometry::Triangles(lid)])
+}
+
+/// The maps of all materials.
+fn bake_atlas(device: &Arc<Device>, kind: TracerKind, scene: &Scene, settings: &BakeSettings) -> Vec<BakedMap> {
+    let planned = plan(scene, None, settings, &mut NoControl).unwrap();
+    let tracing = tracing(kind);
+    let session = BakeSession { scene, device, tracing: &tracing, settings, detailed: None, occluding: &[] };
+    session.bake_textures(&planned, &mut NoControl).unwrap()
+}
+
+/// Materials that share a texture occlude one another, or each itself alone.
+#[test]
+fn gpu_bake_an_atlas() {
+    let device = device();
+    let scene = floor_and_lid();
+    for kind in picked(&device) {
+        let values = |occluders| {
+            let settings = BakeSettings { is_atlas: true, occluders, ..settings(8, 64) };
+            let maps = bake_atlas(&device, kind, &scene, &settings);
+            assert!(maps.len() == 1 && maps[0].covered.iter().all(|c| *c), "{kind}");
+            [maps[0].values[8].x, maps[0].values[15].x]
+        };
+        let [floor, lid] = values(Occluders::Scene);
+        assert!(floor < 0.01 && lid > 0.9, "{kind}: {floor} {lid}");
+        assert_eq!(values(Occluders::Material), [1.0; 2], "{kind}");
+    }
+}
+
+/// Stops a bake once it has told of so many parts.
+struct StopAfter(u32);
+
+impl Control for StopAfter {
+    fn progress(&mut self, _: u64, _: u64) {
+        self.0 = self.0.saturating_sub(1);
+    }
+
+    fn should_stop(&mut self) -> skylit::Result<bool> {
+        if self.0 == 0 { Err(Error::Interrupted) } else { Ok(false) }
+    }
+}
+
+/// A bake that is interrupted between its parts, and goes on, has the bits of one that is not.
+#[test]
+fn gpu_bake_goes_on_after_an_interruption() {
+    let device = device();
+    let scene = floor_and_lid();
+    let kind = picked(&device)[0];
+    let tracing = tracing(kind);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("map.parts");
+    // so wide a texture has two parts; each of two materials that occlude themselves has them, too
+    let wide = BakeSettings { size: [16384, 32], is_atlas: true, ..settings(8, 4) };
+    let filtered = BakeSettings { is_smoothed: true, occluders: Occluders::Material, ..wide.clone() };
+    for settings in [BakeSettings { is_smoothed: false, ..wide }, filtered] {
+        let planned = plan(&scene, None, &settings, &mut NoControl).unwrap();
+        let session = BakeSession {
+            scene: &scene,
+            device: &device,
+            tracing: &tracing,
+            settings: &settings,
+            detailed: None,
+            occluding: &[],
+        };
+        let fingerprint = session.fingerprint(&planned);
+        let run = |control: &mut dyn Control| {
+            let mut kept = KeptParts::open(&path, &fingerprint, settings.is_smoothed).unwrap();
+            session.bake_textures_in_parts(&planned, Some(&mut kept), control)
+        };
+        let mut length = 0;
+        let mut interruptions = 0;
+        let map = loop {
+            // each run gets a part further than the one before
+            match run(&mut StopAfter(interruptions + 1)) {
+                Ok(mut maps) => break maps.remove(0),
+                Err(Error::Interrupted) => interruptions += 1,
+                Err(e) => panic!("{e}"),
+            }
+            let grown = std::fs::metadata(&path).unwrap().len();
+            assert!(grown >= length && interruptions < 100, "{grown} {length}");
+            length = grown;
+        };
+        let rays_of_last = map.rays;
+        let whole = session.bake_textures(&planned, &mut NoControl).unwrap().remove(0);
+        println!("{interruptions} interruptions, {length} bytes of parts");
+        assert!(interruptions > 0 && length > 1 << 20);
+        assert_eq!((map.values, map.error.to_bits()), (whole.values, whole.error.to_bits()));
+        assert_eq!((rays_of_last, map.hidden, map.seams), (whole.rays, whole.hidden, whole.seams));
+
+        // of another seed it is another bake
+        let other = BakeSettings { seed: 1, ..settings.clone() };
+        let other = BakeSession { settings: &other, ..session };
+        assert_ne!(other.fingerprint(&planned), fingerprint);
+        std::fs::remove_file(&path).unwrap();
     }
 }
 

@@ -331,7 +331,125 @@ fn instances_have_an_image_each() {
     let unique: std::collections::BTreeSet<_> = instances.iter().collect();
     assert!(instances.len() > 2 && unique.len() == instances.len(), "{record}");
     assert!(record["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file()));
-    refuses(&["bake", &glb, "-o", &glb, "--unique-instances"], 64, "--unique-instances is for images");
+}
+
+/// In a model each instance has a copy of its mesh, and of its material with a texture of its own; vertices are shared.
+#[test]
+fn instances_have_a_texture_each_in_a_model() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [shared, unique] = ["shared.glb", "unique.glb"].map(|name| place(&dir, name));
+    let options = ["--size", "64", "--spp", "64", "--verify"];
+    let bake = |glb: &str, more: &[&str]| bakes(&[&["builtin:stairs", "-o", glb], &options[..], more].concat());
+    let [before, after] = [bake(&shared, &[]), bake(&unique, &["--unique-instances"])];
+
+    // steps see other steps above them than the first one does
+    let error = |record: &Value| record["verify"]["rmse"].as_f64().unwrap();
+    assert!(error(&after) < 0.85 * error(&before) && error(&after) < 0.06, "{before} {after}");
+
+    // as many accessors but for none, and each node its own mesh
+    let [before, after] = [&shared, &unique].map(|glb| document(glb));
+    let count = |document: &Value, list: &str| document[list].as_array().unwrap().len();
+    assert_eq!(count(&before, "accessors"), count(&after, "accessors"));
+    let placed = |document: &Value| -> Vec<u64> {
+        let nodes = document["nodes"].as_array().unwrap().iter();
+        nodes.filter_map(|node| node["mesh"].as_u64()).collect()
+    };
+    let distinct = |numbers: &[u64]| numbers.iter().collect::<std::collections::BTreeSet<_>>().len();
+    let (meshes, instances) = (distinct(&placed(&before)), placed(&after).len());
+    assert!(meshes < instances && distinct(&placed(&after)) == instances, "{after}");
+    assert_eq!(count(&after, "meshes") - count(&before, "meshes"), instances - meshes);
+
+    // materials and textures of their own, from the same vertices
+    let of_mesh = |mesh: u64| &after["meshes"][mesh as usize]["primitives"][0];
+    let textures = placed(&after).into_iter().map(|mesh| {
+        let material = of_mesh(mesh)["material"].as_u64().unwrap() as usize;
+        after["materials"][material]["occlusionTexture"]["index"].as_u64().unwrap()
+    });
+    let textures: Vec<u64> = textures.collect();
+    let most = placed(&before).iter().map(|m| placed(&before).iter().filter(|n| *n == m).count()).max().unwrap();
+    assert!(most > 2 && distinct(&textures) >= most, "{textures:?}");
+    let scene = load(&unique).unwrap();
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+
+    // a node that places its mesh several times has one material for all
+    let model = folded(dir.path());
+    let text = fs::read_to_string(&model).unwrap();
+    let extension = r#""extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0}}}, "mesh":0"#;
+    let instanced = place(&dir, "instanced.gltf");
+    fs::write(&instanced, text.replacen(r#""mesh":0"#, extension, 1)).unwrap();
+    let args = ["bake", &instanced, "-o", &unique, "--size", "32", "--unique-instances"];
+    fails(&run(&args), 64, &["node `fold`", "EXT_mesh_gpu_instancing", "bake images"]);
+    let out = run(&["bake", &instanced, "-o", &unique, "--size", "32", "--spp", "4"]);
+    assert!(out.status.success(), "{}", stderr(&out));
+}
+
+/// One texture for all materials, as exact as those that have as many texels together.
+#[test]
+fn an_atlas_is_one_texture_of_all_materials() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [glb, own] = ["atlas.glb", "own.glb"].map(|name| place(&dir, name));
+    let bake = |glb: &str, size: &str, more: &[&str]| {
+        let options = ["--spp", "64", "--ao-radius", "1", "--verify"];
+        bakes(&[&["builtin:cornell-box", "-o", glb, "--size", size], &options[..], more].concat())
+    };
+    let separate = bake(&own, "64", &[]);
+    let count = separate["textures"].as_array().unwrap().len();
+    let atlas = bake(&glb, "128", &["--atlas"]);
+    assert!(count == 3 || count == 4, "{separate}");
+    let error = |record: &Value| record["verify"]["rmse"].as_f64().unwrap();
+    println!("RMSE of an atlas {}, of {count} textures {}", error(&atlas), error(&separate));
+    assert!(error(&atlas) < 1.25 * error(&separate) && error(&atlas) < 0.05, "{atlas} {separate}");
+
+    // all materials have it, by the same set of coordinates
+    let textures = atlas["textures"].as_array().unwrap();
+    assert_eq!((textures.len(), textures[0]["materials"].as_array().unwrap().len()), (1, count));
+    let document = document(&glb);
+    assert_eq!(document["images"].as_array().unwrap().len(), 1);
+    let slots = document["materials"].as_array().unwrap().iter().map(|m| m["occlusionTexture"].to_string());
+    let slots: std::collections::BTreeSet<String> = slots.collect();
+    assert_eq!(slots.into_iter().collect::<Vec<_>>(), [r#"{"index":0,"texCoord":0}"#]);
+
+    // its coordinates are those of images, and of the next atlas; without them there is no image
+    let exr = place(&dir, "map.exr");
+    let record = bakes(&[&glb, "-o", &exr, "--atlas", "--size", "64", "--spp", "4", "--map", "thickness"]);
+    assert_eq!((record["files"].as_array().unwrap().len(), &record["textures"][0]["texcoord"]), (1, &0.into()));
+    assert!(record["textures"][0]["covered"].as_f64().unwrap() > 0.4, "{record}");
+    let again = bakes(&[&glb, "-o", &own, "--atlas", "--size", "64", "--spp", "4"]);
+    assert_eq!(again["textures"][0]["unwrapped"], false);
+    fails(&run(&["bake", "builtin:cornell-box", "-o", &exr, "--atlas"]), 64, &["atlas: has no texture coordinates"]);
+    let model = squares(dir.path(), "tiles.obj", 0.0, &[[0, 0], [1, 0]]);
+    fails(&run(&["bake", &model, "-o", &exr, "--atlas"]), 64, &["lie in 2 tiles (UDIM), not in one", "-o NAME.glb"]);
+}
+
+/// The file of finished parts is taken where it is of this bake, and refused where it is not.
+#[test]
+fn finished_parts_are_kept_until_the_output_is_written() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = squares(dir.path(), "floor.obj", 0.0, &[[0, 0]]);
+    let [exr, parts] = ["map.exr", "map.exr.parts"].map(|name| place(&dir, name));
+    let args = ["bake", &model, "-o", &exr, "--size", "16", "--spp", "4", "--resumable"];
+    assert!(run(&args).status.success());
+    assert!(Path::new(&exr).is_file() && !Path::new(&parts).exists());
+    let whole = fs::read(&exr).unwrap();
+    fs::remove_file(&exr).unwrap();
+
+    // a file that is none, and one of another bake
+    fs::write(&parts, "something else").unwrap();
+    fails(&run(&args), 3, &["map.exr.parts: is no file of a bake under way"]);
+    fs::write(&parts, format!("skylit parts  1\n{}", "0".repeat(32))).unwrap();
+    fails(&run(&args), 64, &["--resumable", "map.exr.parts is of another bake", "delete it"]);
+    fs::remove_file(&parts).unwrap();
+    assert!(run(&args).status.success());
+    assert_eq!(fs::read(&exr).unwrap(), whole);
 }
 
 #[test]
@@ -342,6 +460,12 @@ fn what_cannot_be_baked_is_refused() {
     refuses(&["bake", &model, "-o", "a.jpg"], 64, ".png or .exr");
     refuses(&["bake", &model, "-o", &glb, "--map", "normal"], 64, "a model holds ambient occlusion alone");
     refuses(&["bake", &model, "-o", &png, "--to", "vertices"], 64, "an image has no vertices");
+    refuses(&["bake", &model, "-o", &glb, "--to", "vertices", "--atlas"], 64, "--atlas is for textures");
+    refuses(&["bake", &model, "-o", &glb, "--to", "vertices", "--resumable"], 64, "--resumable is for textures");
+    refuses(&["bake", &model, "-o", &glb, "--to", "vertices", "--unique-instances"], 64, "instances share");
+    refuses(&["bake", &model, "-o", &glb, "--atlas", "--texcoord", "0"], 64, "--texcoord: an atlas needs");
+    refuses(&["bake", &model, "-o", &glb, "--atlas", "--unique-instances"], 64, "--atlas: instances");
+    refuses(&["bake", &model, "-o", &glb, "--atlas", "--pack", "orm"], 64, "not in an atlas");
     refuses(&["bake", &model, "-o", &png, "--verify"], 64, "--verify renders the written model");
     refuses(&["bake", &model, "-o", &glb, "--size", "0"], 64, "from 1 to 16384");
     refuses(&["bake", &model, "-o", &glb, "--texcoord", "x"], 64, "auto, unwrap or the number of a set");

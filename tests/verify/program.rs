@@ -291,3 +291,46 @@ fn gpu_golden_images_are_made_and_compared() {
     );
     assert!(report.join("data/images-1.js").exists() && lines.contains("report: file://"));
 }
+
+/// A map of a model is compared with its golden image, with every seed, and a part that moves is found.
+#[test]
+fn a_change_of_a_baked_map_is_found() {
+    if !device() {
+        return;
+    }
+    let options = "--map ao --atlas --size 32 --spp 64 --ao-radius 2";
+    let frame = |name: &str, bake: &str, tolerance: &str| {
+        format!(
+            "[[frame]]\nname = \"{name}\"\nscene = \"corner.obj\"\nbake = \"{bake}\"\ntracers = [\"all\"]\ntolerance = {tolerance}\n"
+        )
+    };
+    let light = "--map light --atlas --size 32 --spp 16 --environment 1,1,1";
+    let flip = "{ flip = { percentile = 99, max = 0.05 } }";
+    let dir = folder(&(frame("ao", options, "\"z_test\"") + &frame("light", light, flip)));
+    let model = std::fs::read_to_string("tests/frames/corner.obj").unwrap();
+    std::fs::copy("tests/frames/corner.mtl", dir.path().join("corner.mtl")).unwrap();
+    std::fs::write(dir.path().join("corner.obj"), &model).unwrap();
+    let verify = |more: &[&str]| run(&[&["verify", text(dir.path())], more].concat());
+    let made = verify(&["--update-missing", "--force"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    for more in [&[][..], &["--seed", "7", "--filter", "ao"]] {
+        let out = verify(more);
+        assert!(out.status.success(), "{}{}", String::from_utf8_lossy(&out.stdout), stderr(&out));
+    }
+
+    // the top of the box sinks
+    let sunk = model.replace(" 1.5 ", " 1 ");
+    assert_ne!(sunk, model);
+    std::fs::write(dir.path().join("corner.obj"), sunk).unwrap();
+    let out = verify(&[]);
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(out.status.code() == Some(1) && !said.contains(" hold"), "{said}{}", stderr(&out));
+
+    // one image: two materials have two
+    let two = frame("two", "--map ao --size 32 --spp 64", "\"z_test\"");
+    std::fs::write(dir.path().join("frames.toml"), two).unwrap();
+    let out = verify(&["--update-missing", "--force"]);
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert_eq!(out.status.code(), Some(2));
+    assert!(said.contains("has 2 textures, and a frame is one image: add --atlas or --only-material"), "{said}");
+}

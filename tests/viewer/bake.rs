@@ -316,3 +316,53 @@ fn gpu_a_scene_is_baked_and_compared() {
     let dark = values.iter().filter(|value| **value > 0.05 && **value < 0.7).count();
     assert!(20 * dark > values.len(), "{dark} of {} pixels", values.len());
 }
+
+/// The preview bakes few texels into a file of its own and shows a picture of it; the scene stays.
+#[cfg(unix)]
+#[test]
+fn a_preview_is_shown_in_the_dialog() {
+    let dir = tempfile::tempdir().unwrap();
+    let (told, picture) = (dir.path().join("told"), dir.path().join("picture.png"));
+    image::RgbaImage::from_pixel(42, 28, image::Rgba([200, 100, 50, 255])).save(&picture).unwrap();
+    let script = |render: &str| {
+        let told = told.display();
+        format!("printf '%s ' \"$@\" >> {told}; printf '\\n' >> {told}; test $1 = bake || {render}")
+    };
+    let mut alone = opened();
+    let shown = |alone: &Alone| has(alone, Role::Image, "Preview of the baked model");
+    let copies = program(dir.path(), &script(&format!("cp {} $5", picture.display())));
+    alone.change(|app| app.program = copies);
+    choose(&mut alone, "Texture size", "2048 x 2048");
+    assert!(!shown(&alone));
+    alone.click("Preview");
+    wait(&mut alone, shown);
+
+    // few texels of the same bake, and then a picture of the model from the view
+    let lines: Vec<String> = std::fs::read_to_string(&told).unwrap().lines().map(str::to_owned).collect();
+    assert_eq!(lines.len(), 2, "{lines:?}");
+    let (bake, render) = (&lines[0], &lines[1]);
+    for part in ["bake builtin:stairs -o", "preview.glb", "--size 256", "--spp 8", "--denoise", "--ao-radius 0.75"] {
+        assert!(bake.contains(part), "{bake}: {part}");
+    }
+    for part in ["render ", "preview.glb --no-config -o", "preview.png", "--integrator baked-occlusion", "--camera 0"] {
+        assert!(render.contains(part), "{render}: {part}");
+    }
+    let model = bake.split(' ').nth(3).unwrap().to_owned();
+    assert!(render.contains(&model));
+    command::refuses(&render.split_whitespace().collect::<Vec<_>>(), 3, "preview.glb");
+    assert_eq!(alone.mailbox.peek().load, 1);
+    assert!(asked(&alone).1.size == 2048 && !alone.shows("of other numbers"));
+    set(&mut alone, "Samples per texel", 32.0);
+    assert!(asked(&alone).1.spp == 32 && alone.shows("of other numbers"));
+
+    // one that fails says why, and goes with the dialog
+    let fails = program(dir.path(), "echo 'skylit: error: charts do not fit' >&2; exit 4");
+    alone.change(|app| app.program = fails);
+    alone.click("Preview");
+    wait(&mut alone, |alone| alone.shows("charts do not fit"));
+    assert!(!shown(&alone));
+    alone.change(|app| app.dialog = None);
+    let image = BakeWanted { place: BakePlace::Image, ..alone.harness.state().default_bake() };
+    alone.change(|app| app.dialog = Some(Dialog::Bake("a.png".into(), image)));
+    assert!(!has(&alone, Role::Button, "Preview"));
+}

@@ -183,6 +183,48 @@ impl AmendedFile {
         })
     }
 
+    /// Appends a copy of an element of a list, with changes; returns its index.
+    fn push_copy(&mut self, name: &'static str, index: usize, change: impl FnOnce(&mut Object)) -> Result<usize> {
+        let list = self.list(name);
+        let copy = list.values.get(index).cloned();
+        list.values.extend(copy);
+        list.has_changed = true;
+        // a list without such an element has grown by none, and has none at its end
+        let last = if index < list.values.len() { list.values.len() - 1 } else { index };
+        self.change(name, last, change)?;
+        Ok(last)
+    }
+
+    /// Adds a copy of a material that is called `name`; returns its index.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the file has no such material.
+    pub fn copy_material(&mut self, material: usize, name: &str) -> Result<usize> {
+        self.push_copy("materials", material, |m| m.set("name", &name))
+    }
+
+    /// Gives a node a copy of its mesh, which shares all accessors with it; returns the index of
+    /// the copy.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the file has no such node, or the node no mesh.
+    pub fn copy_mesh_of_node(&mut self, node: usize) -> Result<usize> {
+        let mut mesh = None;
+        self.change("nodes", node, |n| {
+            mesh = n.get("mesh").and_then(|mesh| serde_json::from_str::<usize>(mesh.get()).ok());
+        })?;
+        let mesh = mesh.ok_or_else(|| Error::input(self.source.path(), format!("node {node} has no mesh")))?;
+        let copy = self.push_copy("meshes", mesh, |_| {})?;
+        self.change("nodes", node, |n| n.set("mesh", &copy))?;
+        Ok(copy)
+    }
+
+    /// Returns true if an animation changes a property of a material (`KHR_animation_pointer`).
+    pub fn is_animated(&self, material: usize) -> bool {
+        let animations = self.root.get("animations");
+        animations.is_some_and(|text| text.get().contains(&format!("\"/materials/{material}/")))
+    }
+
     /// Adds a material with glTF's default values, for primitives that have none.
     pub fn add_material(&mut self, name: &str) -> usize {
         self.push("materials", &json!({ "name": name }))

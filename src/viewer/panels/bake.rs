@@ -4,6 +4,7 @@ use egui::{DragValue, Ui, WidgetInfo, WidgetType};
 
 use super::menu;
 use crate::viewer::app::App;
+use crate::viewer::bake_preview::{BakePreview, Shown};
 use crate::viewer::baking::{BakePlace, BakeWanted, BakedMap};
 use crate::viewer::dialog::Dialog;
 use crate::viewer::rounding::round_length;
@@ -80,6 +81,9 @@ pub fn numbers(app: &App, ui: &mut Ui, text: &mut String, wanted: &mut BakeWante
 
     // the rest
     ui.horizontal(|ui| {
+        if wanted.place == BakePlace::Texture {
+            ui.checkbox(&mut wanted.is_atlas, "Atlas").on_hover_text("One texture for all materials\n--atlas");
+        }
         if wanted.can_denoise() {
             ui.checkbox(&mut wanted.is_denoised, "Denoise")
                 .on_hover_text("Filter noise in the texture, not across edges or charts (biased)\n--denoise");
@@ -98,6 +102,31 @@ pub fn numbers(app: &App, ui: &mut Ui, text: &mut String, wanted: &mut BakeWante
     if !has_own_name {
         *text = file_name(app, wanted);
     }
+}
+
+/// Shows the button of the preview, and the preview; returns true if one is asked for.
+pub fn preview(app: &App, ui: &mut Ui, wanted: &BakeWanted) -> bool {
+    if wanted.place == BakePlace::Image {
+        return false;
+    }
+    let mut is_asked = false;
+    ui.horizontal(|ui| {
+        let hint = "Bakes few texels and samples, and shows the model from here: neither changes the scene";
+        is_asked = ui.button("Preview").on_hover_text(hint).clicked();
+        let shown = app.bake_preview.as_ref().map(BakePreview::shown);
+        match &shown {
+            Some(Shown::Progress(what)) => ui.label(what),
+            Some(Shown::Failure(why)) => ui.label(*why),
+            Some(Shown::Picture(_)) if app.bake_preview.as_ref().is_some_and(|p| p.wanted != *wanted) => {
+                ui.label("of other numbers")
+            }
+            _ => ui.label("few texels and samples"),
+        };
+    });
+    if let Some(Shown::Picture(picture)) = app.bake_preview.as_ref().map(BakePreview::shown) {
+        ui.add(egui::Image::new(picture).alt_text("Preview of the baked model"));
+    }
+    is_asked
 }
 
 /// How far rays go: a radius as the view has it, or a share of the scene.

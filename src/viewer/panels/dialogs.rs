@@ -124,6 +124,7 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
 
     // its window: a path, and the action as a button
     let (mut open, mut done, mut browses, before) = (true, false, false, app.dialog.clone());
+    let mut wants_preview = false;
     egui::Window::new(title)
         .open(&mut open)
         .collapsible(false)
@@ -142,6 +143,7 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
             }
             if let Dialog::Bake(text, wanted) = &mut dialog {
                 bake::numbers(app, ui, text, wanted);
+                wants_preview = bake::preview(app, ui, wanted);
             }
             ui.horizontal(|ui| {
                 done |= ui.button(action).clicked();
@@ -158,6 +160,14 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         app.browsing = Some(Browsing::start(dialog.clone(), move || context.request_repaint()));
     }
 
+    if let Dialog::Bake(_, wanted) = &dialog
+        && wants_preview
+    {
+        app.preview_bake(wanted);
+    }
+    if !open || done {
+        app.bake_preview = None;
+    }
     if !open {
         app.dialog = None;
     } else if done {

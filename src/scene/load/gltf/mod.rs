@@ -148,6 +148,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
                 };
                 for (object_to_world, carrier) in places {
                     scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
+                    scene.report.instance_nodes.push(placed.node);
                     stage.add_instance(at, carrier);
                 }
             }
