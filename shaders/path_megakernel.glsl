@@ -75,7 +75,7 @@ void main() {
             }
             bool occluded = few_any(few, few_count, to_light);
             if (has_ray) shadow_rays++;
-            if (has_ray && !occluded) radiance += vec4(i == 0u ? light_contributions[0] : light_contributions[1], 0.0);
+            if (has_ray && !occluded) radiance += vec4(i == 0u ? light_contributions[0] : light_contributions[1], WITH_CATCHER && i == 0u ? light_coverage : 0.0);
         }
 
         if (has_path) {

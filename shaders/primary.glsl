@@ -61,7 +61,7 @@ void closest(uint index, Hit hit) {
     Surface s;
 #ifdef TAKES_TRACER_HITS
     // A geometric normal that is turned to the viewer follows from the corners alone, unless the surface is seen exactly from the side.
-    bool needs_submesh = !SINGLE_LEVEL || HAS_SPHERES || about_ns;
+    bool needs_submesh = !SINGLE_LEVEL || HAS_SPHERES || about_ns || HAS_CATCHER;
     if (!needs_submesh) {
         s = surface_of_corners(hit);
         needs_submesh = !(abs(dot(s.ng, view_direction(p, s.position))) > 0.0);
@@ -77,9 +77,15 @@ void closest(uint index, Hit hit) {
     Hemisphere h = hemisphere_at(p, s, about_ns);
     uvec2 pixel = block_pixel(p, pixel_index(index)) + p.block_origin;
     uint first = first_sample(index), tag = (index - push.first) << push.shared_bits;
+    // what a ground occludes is not seen: its samples say whether it is occluded (occlusion.glsl)
+    bool is_caught = false;
+    if (HAS_CATCHER) is_caught = load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh).material == ao.catcher;
+    if (is_caught) tag |= CAUGHT;
     for (uint k = 0u; k < 1u << push.shared_bits; k++) {
         vec3 w = to_world(h.axis, cosine_hemisphere(sample_2d(p.seed, pixel, first + k, AO_DIRECTION)));
-        Ray r = occlusion_ray(s.position, s.offset, h.ng, w, ao.occlusion.reach);
+        float reach = ao.occlusion.reach;
+        if (HAS_CATCHER && is_caught) reach = random_reach(ao.occlusion, sample_2d(p.seed, pixel, first + k, AO_LENGTH).x);
+        Ray r = occlusion_ray(s.position, s.offset, h.ng, w, reach);
         // rays are kept of launches in which no samples share a camera ray
         dump_ray(ao.occlusion_dump, index, r);
 #ifdef APPENDS_RAYS_PER_HIT

@@ -3,6 +3,7 @@
 #ifndef AO_SAMPLE
 #define AO_SAMPLE
 #include "common/types.glsl"
+#include "interface/ao.glsl"
 
 // Occlusion of a hit at a distance: c^-d, given log2(c).
 float occlusion_at(float falloff_log2, float distance_) {
@@ -11,6 +12,11 @@ float occlusion_at(float falloff_log2, float distance_) {
 
 float occlusion_of(float falloff_log2, Hit hit) {
     return is_hit(hit) ? occlusion_at(falloff_log2, hit.t) : 0.0;
+}
+
+// The length of an occlusion ray that any hit ends: with falloff c it is longer than d with probability c^-d, so a hit at distance d occludes by c^-d on average.
+float random_reach(OcclusionRecord o, float u) {
+    return o.falloff_log2 > 0.0 ? min(o.reach, -log2(1.0 - u) / o.falloff_log2) : o.reach;
 }
 
 // The ray of direction w from a surface with geometric normal ng, `offset` above it so that it does not hit the surface itself, up to distance `reach`.

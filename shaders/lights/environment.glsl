@@ -11,7 +11,20 @@ vec3 environment_radiance(PathParams p, vec3 w) {
     return p.environment * map_radiance(map_point(p.map, w));
 }
 
-// The same, of a map, and the density with which its directions are sampled.
+// What a camera ray shows that leaves the scene, where that is not the light from there.
+const bool WITH_BACKGROUND = WITH_HIDDEN_BACKGROUND || WITH_BLURRED_BACKGROUND;
+
+vec3 background_radiance(PathParams p, vec3 w) {
+    if (WITH_HIDDEN_BACKGROUND) return vec3(0.0);
+    if (!WITH_ENVIRONMENT_MAP) return p.environment;
+    EnvironmentRecord map = p.map;
+    map.texels = map.blurred;
+    map.width = BLURRED_WIDTH;
+    map.height = BLURRED_HEIGHT;
+    return p.environment * map_radiance(map_point(map, w));
+}
+
+// Radiance of a map from direction w, and the density with which its directions are sampled.
 vec4 environment_and_pdf(PathParams p, vec3 w) {
     MapPoint at = map_point(p.map, w);
     return vec4(p.environment * map_radiance(at), p.environment_probability * map_pdf(p.map, at));

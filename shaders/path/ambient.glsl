@@ -11,13 +11,11 @@ vec3 ambient_reflectance(Surface s, Shading m, float log_side) {
     return max(surface_albedo(s, log_side) * (1.0 - m.bsdf.through_share) - m.bsdf.transmitted, vec3(0.0));
 }
 
-// The occlusion ray of a sample (ao/sample.glsl). With falloff c its length is random, longer than d with probability c^-d: a hit at distance d then occludes by
-// c^-d on average, and any hit will do.
+// The occlusion ray of a sample (ao/sample.glsl), of random length: any hit will do.
 Ray ambient_ray(BlockParams block, OcclusionRecord o, Surface s, vec3 ng, uvec2 pixel, uint n) {
     vec3 axis = o.hemisphere == 0u ? ng : dot(s.ng, ng) < 0.0 ? -s.ns : s.ns;
     vec3 w = to_world(axis, cosine_hemisphere(sample_2d(block.seed, pixel, n, AO_DIRECTION)));
-    float reach = o.reach;
-    if (o.falloff_log2 > 0.0) reach = min(reach, -log2(1.0 - sample_2d(block.seed, pixel, n, AO_LENGTH).x) / o.falloff_log2);
+    float reach = random_reach(o, sample_2d(block.seed, pixel, n, AO_LENGTH).x);
     return occlusion_ray(s.position, s.offset, ng, w, reach);
 }
 

@@ -56,6 +56,7 @@ float reflection_roughness(Bsdf b) {
 // What a camera ray sees that meets no surface.
 vec3 background(PathParams p, vec3 w) {
     if (WITH_CONSTANT_ALBEDO) return vec3(0.0);
+    if (WITH_BACKGROUND) return counted_radiance(p, background_radiance(p, w), 0u);
     vec3 c = environment_radiance(p, w);
     PathState start = PathState(vec3(1.0), -1.0, 0u, 0u, 0u, false, 1.0, NO_MEDIUM);
     if (WITH_DISTANT_DISKS) c += disks_met(p, start, 1.0, w);

@@ -16,6 +16,7 @@ bool has_next_ray, has_light_ray[2];
 Ray next_ray, light_rays[2];
 PathState next_state;
 vec3 light_contributions[2];
+float light_coverage = 0.0;  // what the first contribution adds to the path's coverage
 // of the path's last vertex: its ray cone, the volumes that the path is in, the share of placed lights in its samples, and the density of light sampling for the environment in the
 // direction that it took
 Cone last_cone;
@@ -34,6 +35,7 @@ Ray seeded(Ray r) {
 void clear_left_rays() {
     has_next_ray = false;
     has_light_ray[0] = false;
+    light_coverage = 0.0;
     has_light_ray[1] = false;
 }
 
@@ -54,6 +56,11 @@ void leave_light_ray(PathParams p, uint k, bool is_second, Ray r, vec3 contribut
         light_rays[0] = r;
         light_contributions[0] = contribution;
     }
+}
+
+void leave_caught_ray(PathParams p, uint k, Ray r, vec3 contribution) {
+    leave_light_ray(p, k, false, r, contribution, vec3(0.0));
+    light_coverage = -1.0;
 }
 
 Cone load_cone(PathParams p, uint k) { return last_cone; }
@@ -79,6 +86,12 @@ void leave_light_ray(PathParams p, uint k, bool is_second, Ray r, vec3 contribut
     else slot = append_ray(p.shadow, r, k);
     store_quad(is_second ? p.distant_contributions : p.contributions, slot, vec4(contribution, 0.0));
     if (WITH_SIGNAL) store_quad(is_second ? p.distant_diffuse_contributions : p.diffuse_contributions, slot, vec4(diffuse, 0.0));
+}
+
+// The ray that decides whether a catcher is in shadow: unoccluded, it shows what is behind, and covers nothing.
+void leave_caught_ray(PathParams p, uint k, Ray r, vec3 contribution) {
+    uint slot = append_ray(p.shadow, r, k);
+    store_quad(p.contributions, slot, vec4(contribution, -1.0));
 }
 
 Cone load_cone(PathParams p, uint k) {

@@ -212,6 +212,9 @@ void scatter_path(BlockParams block, PathParams p, uint k, PathState state, Ray 
     leave_next_ray(p, k, Ray(ray.origin + length_ * ray.direction, 0.0, w, INFINITY), state);
 }
 
+// uses the functions above
+#include "path/catcher.glsl"
+
 // k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
 vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     PathParams p = path_params();
@@ -230,6 +233,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
+        // mirrors and glass show what lights them
+        if (WITH_BACKGROUND && state.depth + state.passes == 0u) return counted_radiance(p, state.throughput * background_radiance(p, ray.direction), 0u);
         float light = 0.0, share = last_shares(p, k, state).distant;
         vec3 c;
         if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && !SKY_PDF_OF_SURFACE) {
@@ -246,6 +251,10 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         return counted_radiance(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
+    if (WITH_CATCHER && state.depth + state.passes == 0u && load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh).material == p.catcher) {
+        catch_shadow(block, p, k, state, s, ray.direction, pixel, n, dimension);
+        return vec3(0.0);
+    }
     vec3 towards_viewer = -ray.direction;
     bool front = dot(s.ng, towards_viewer) > 0.0;
     Cone cone = Cone(0.0, 0.0);

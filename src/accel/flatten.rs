@@ -224,7 +224,7 @@ impl<'a> FlatScene<'a> {
 
     /// World bounds relative to the origin; empty for a scene without geometry.
     pub fn bounds(&self) -> Aabb {
-        let Some((lo, hi)) = self.scene.bounds() else { return Aabb::EMPTY };
+        let Some((lo, hi)) = self.scene.bounds_with_ground() else { return Aabb::EMPTY };
         Aabb { min: (lo - self.origin).as_vec3(), max: (hi - self.origin).as_vec3() }
     }
 

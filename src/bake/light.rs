@@ -7,6 +7,7 @@ use super::{BakeSettings, LightSettings};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::{Control, SampleSettings};
+use crate::integrators::backdrop::Backdrop;
 use crate::integrators::path::PathOptions;
 use crate::integrators::path::points::PointLight;
 use crate::integrators::{IntegratorName, IntegratorSettings, RenderJob};
@@ -49,7 +50,13 @@ impl LightSettings {
     fn path_options(&self, scene: &Scene) -> Result<PathOptions> {
         let settings = self.of_integrators();
         let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 1.0);
-        let job = RenderJob { scene, camera: &camera, samples: SampleSettings::default(), settings: &settings };
+        let job = RenderJob {
+            scene,
+            camera: &camera,
+            samples: SampleSettings::default(),
+            settings: &settings,
+            backdrop: Backdrop::default(),
+        };
         let options = self.integrator()?.get().path_options(&job)?;
         options.ok_or_else(|| Error::Usage("a light map needs an integrator of paths".to_owned()))
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec4};
+use glam::DVec3;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::cage::{Cage, Detailed};
@@ -20,14 +20,11 @@ use crate::gpu::Device;
 use crate::integrators::ao::Hemisphere;
 use crate::scene::builtin::shapes;
 use crate::scene::load::SourceFile;
-use crate::scene::material::MaterialKind;
-use crate::scene::{Instance, Material, Mesh, Motion, Scene, fingerprint};
+use crate::scene::{Motion, Scene, fingerprint, laid_ground};
 use crate::tracer::{DeviceSettings, Needs, Tracer};
 
 /// Side of the ground plane, in diagonals of the scene.
 const GROUND: f64 = 20.0;
-/// Linear base colour of the ground plane, which light maps see.
-const GROUND_COLOR: Vec4 = Vec4::new(0.5, 0.5, 0.5, 1.0);
 
 /// A scene and the device that bakes it.
 pub struct BakeSession<'a> {
@@ -212,20 +209,7 @@ impl BakeSession<'_> {
         if let Some((low, high)) = self.settings.has_ground.then(|| scene.bounds()).flatten() {
             let centre = 0.5 * (low + high);
             let floor = shapes::floor(DVec3::new(centre.x, low.y, centre.z), GROUND * (high - low).length());
-            let scene = scene.to_mut();
-            scene.instances.push(Instance {
-                name: "ground".to_owned(),
-                mesh: scene.meshes.len(),
-                object_to_world: glam::DAffine3::IDENTITY,
-            });
-            // of no material of the scene, which may emit
-            let material = scene.materials.len();
-            scene.materials.push(Material {
-                kind: MaterialKind::Matte,
-                base_color: GROUND_COLOR,
-                ..Material::default()
-            });
-            scene.meshes.push(Mesh { name: "ground".to_owned(), geometry: floor, material, source: None });
+            laid_ground::add_plane(scene.to_mut(), floor, DVec3::ZERO);
         }
 
         // other models, whose instances come last: the others keep their numbers

@@ -10,7 +10,7 @@ use crate::files;
 use crate::files::plan::FilePlan;
 use crate::interface::ToneMap;
 use crate::memory::Budget;
-use crate::output::settings::Background;
+use crate::output::settings::{Background, check_alpha};
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, layers, picture};
 use crate::renderer::brightness;
 use crate::settings::parse::parse_number;
@@ -47,6 +47,11 @@ pub struct ConvertArgs {
     /// Exposure of pictures in stops; `auto` makes surfaces middle grey [default: 0]
     #[arg(long, value_name = "EV|auto", value_parser = Exposure::parse, allow_hyphen_values = true)]
     pub exposure: Option<Exposure>,
+    /// Background of pictures: a linear colour from 0 to 1, or `transparent` [default: 0,0,0]
+    ///
+    /// It is for .png, .webp and .jpg outputs. `transparent` keeps alpha, which a .jpg cannot have.
+    #[arg(long, value_name = "R,G,B|transparent", alias = "backdrop", help_heading = "Files", hide_short_help = true)]
+    pub background: Option<Background>,
     /// How image files are written
     #[command(flatten)]
     pub files: FileSettings,
@@ -166,11 +171,17 @@ fn check(args: &ConvertArgs) -> Result<()> {
     plan.check()?;
     args.files.check(&args.outputs, None)?;
     let has_picture = args.outputs.iter().any(|path| ImageFormat::from_path(path).is_ok_and(ImageFormat::is_picture));
-    for (option, is_given) in [("--tone-map", args.tone_map.is_some()), ("--exposure", args.exposure.is_some())] {
+    let of_pictures = [
+        ("--tone-map", args.tone_map.is_some()),
+        ("--exposure", args.exposure.is_some()),
+        ("--background", args.background.is_some()),
+    ];
+    for (option, is_given) in of_pictures {
         if is_given && !has_picture {
             return Err(Error::Usage(format!("{option} is for pictures, and none is written: an .exr stays linear")));
         }
     }
+    check_alpha(args.background, &args.outputs)?;
     args.outputs.iter().try_for_each(|path| files::check_writable(path))
 }
 
@@ -196,7 +207,7 @@ fn write(args: &ConvertArgs, image: &Image, exposure: f64, path: &Path) -> Resul
     }
 
     // Displayed colours are not in proportion to linear ones: with a background alpha goes first.
-    let background: Option<Background> = args.files.background;
+    let background = args.background;
     let mut shown = if background.is_some() { picture::unassociated(image) } else { image.clone() };
     if args.tone_map.is_some() || exposure != 0.0 {
         let planes = layers::colour_planes(&shown).map(|planes| planes.map(<[f32]>::to_vec));
@@ -213,7 +224,7 @@ fn write(args: &ConvertArgs, image: &Image, exposure: f64, path: &Path) -> Resul
     if layers::colour_planes(&shown).is_none() {
         return Err(no_colour(args, image));
     }
-    let of_others = FileSettings { background, ..FileSettings::default() };
+    let of_others = FileSettings::default();
     let settings = if format == ImageFormat::Png { &args.files } else { &of_others };
     Picture::new(&shown, background, settings, path)?.save(path, args.files.jpeg_quality())
 }

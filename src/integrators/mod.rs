@@ -7,6 +7,7 @@
 mod all;
 pub mod ao;
 pub mod aov;
+pub mod backdrop;
 pub mod lighting;
 pub mod path;
 pub mod ray_sets;
@@ -19,6 +20,8 @@ use serde_json::{Map, Value};
 #[cfg(feature = "cli")]
 pub use all::parser;
 pub use all::{ALL, IntegratorName, check};
+
+use backdrop::Backdrop;
 
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
@@ -65,6 +68,8 @@ pub struct RenderJob<'a> {
     pub samples: SampleSettings,
     /// Settings of integrators.
     pub settings: &'a IntegratorSettings,
+    /// The background of camera rays that leave the scene.
+    pub backdrop: Backdrop,
 }
 
 /// Options of the conversion to 8 bits per channel.

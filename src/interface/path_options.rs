@@ -47,6 +47,9 @@ feature_set! {
     SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
     Ambient = "WITH_AMBIENT", "ambient light";
     BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
+    HiddenBackground = "WITH_HIDDEN_BACKGROUND", "an environment that camera rays do not show";
+    BlurredBackground = "WITH_BLURRED_BACKGROUND", "an environment that camera rays show blurred";
+    Catcher = "WITH_CATCHER", "a ground that catches shadows";
     OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
     SurfacePoints = "WITH_SURFACE_POINTS", "paths that begin at given points of surfaces";
     Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";

@@ -1,12 +1,12 @@
-//! How image files are written: bits, transfer function, background, compression.
+//! How image files are written: bits, transfer function, compression; the background of pictures.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{AnimationFormat, ImageFormat, is_animation};
+use super::{AnimationFormat, ImageFormat};
 use crate::error::{Error, Result};
-use crate::settings::{AppliesTo, Editable, Value, choices, settings};
+use crate::settings::{AppliesTo, choices, settings};
 
 choices! {
     /// Bits per channel of PNG files.
@@ -64,7 +64,7 @@ impl FromStr for Background {
 
     fn from_str(text: &str) -> Result<Self, String> {
         const EXPECTED: &str = "expected `transparent`, or a linear colour R,G,B of numbers from 0 to 1";
-        if text.trim() == "transparent" {
+        if ["transparent", "hidden"].contains(&text.trim()) {
             return Ok(Self::Transparent);
         }
         let values = text.split(',').map(|v| v.trim().parse::<f32>().ok().filter(|v| (0.0..=1.0).contains(v)));
@@ -96,12 +96,6 @@ impl<'de> serde::Deserialize<'de> for Background {
     }
 }
 
-impl Editable for Option<Background> {
-    fn value(&mut self) -> Value<'_> {
-        Value::Other
-    }
-}
-
 settings! {
     /// How image files are written.
     "Files"
@@ -115,11 +109,6 @@ settings! {
         /// Linear values need --png-bits 16, or there will be bands. Of frames in real time, linear
         /// is for --show result.
         png_encoding: Option<PngEncoding>, option(value_enum), applies(AppliesTo::ALL);
-        /// Background of pictures: a linear colour from 0 to 1, or `transparent` [default: 0,0,0]
-        ///
-        /// It is for .png, .webp, .jpg and .apng outputs. `transparent` keeps alpha, which a .jpg
-        /// cannot have.
-        background: Option<Background>, option(value_name = "R,G,B|transparent"), applies(AppliesTo::ALL);
         /// Quality of .jpg outputs, 1 to 100 [default: 90]
         jpeg_quality: Option<u32>, option(value_name = "Q", value_parser = clap::value_parser!(u32).range(1..=100)), applies(AppliesTo::ALL);
         /// Store colours, alpha, normals and albedo of .exr outputs as 16-bit floats (half)
@@ -151,8 +140,6 @@ impl FileSettings {
     pub fn check(&self, outputs: &[PathBuf], depth_image: Option<&Path>) -> Result<()> {
         let is = |path: &Path, format: ImageFormat| ImageFormat::from_path(path).is_ok_and(|f| f == format);
         let has = |format: ImageFormat| outputs.iter().any(|p| is(p, format));
-        let has_picture =
-            outputs.iter().any(|p| is_animation(p) || ImageFormat::from_path(p).is_ok_and(ImageFormat::is_picture));
         let has_png = has(ImageFormat::Png);
         let has_deep_depth = depth_image.is_some_and(|p| is(p, ImageFormat::Png));
 
@@ -160,7 +147,6 @@ impl FileSettings {
         let given = [
             ("--png-bits", self.png_bits.is_some(), has_png || has_deep_depth, ".png"),
             ("--png-encoding", self.png_encoding.is_some(), has_png, ".png"),
-            ("--background", self.background.is_some(), has_picture, ".png, .webp, .jpg or .apng"),
             ("--jpeg-quality", self.jpeg_quality.is_some(), has(ImageFormat::Jpeg), ".jpg"),
             ("--exr-half", self.exr_half, has(ImageFormat::Exr), ".exr"),
             ("--exr-compression", self.exr_compression.is_some(), has(ImageFormat::Exr), ".exr"),
@@ -172,22 +158,6 @@ impl FileSettings {
         }
 
         // what a format cannot have
-        if let (Some(Background::Transparent), Some(jpeg)) =
-            (self.background, outputs.iter().find(|p| is(p, ImageFormat::Jpeg)))
-        {
-            return Err(Error::Usage(format!(
-                "--background transparent: {} cannot have alpha; write .png or .webp, or give a colour R,G,B",
-                jpeg.display()
-            )));
-        }
-        if let (Some(Background::Transparent), Some(video)) =
-            (self.background, outputs.iter().find(|p| AnimationFormat::from_path(p) == Some(AnimationFormat::Mp4)))
-        {
-            return Err(Error::Usage(format!(
-                "--background transparent: {} cannot have alpha; write .webm, .apng or .gif, or give a colour R,G,B",
-                video.display()
-            )));
-        }
         match self.exr_compression {
             Some(compression @ (ExrCompression::B44 | ExrCompression::B44a)) if !self.exr_half => {
                 Err(Error::Usage(format!(
@@ -197,4 +167,28 @@ impl FileSettings {
             _ => Ok(()),
         }
     }
+}
+
+/// Checks that files can have the background of pictures: JPEG files and some videos lack alpha.
+///
+/// # Errors
+/// [`Error::Usage`], naming the file and what to do about it.
+pub fn check_alpha(background: Option<Background>, outputs: &[PathBuf]) -> Result<()> {
+    if background != Some(Background::Transparent) {
+        return Ok(());
+    }
+    let is_jpeg = |p: &&PathBuf| ImageFormat::from_path(p).is_ok_and(|f| f == ImageFormat::Jpeg);
+    if let Some(jpeg) = outputs.iter().find(is_jpeg) {
+        return Err(Error::Usage(format!(
+            "--background transparent: {} cannot have alpha; write .png or .webp, or give a colour R,G,B",
+            jpeg.display()
+        )));
+    }
+    if let Some(video) = outputs.iter().find(|p| AnimationFormat::from_path(p) == Some(AnimationFormat::Mp4)) {
+        return Err(Error::Usage(format!(
+            "--background transparent: {} cannot have alpha; write .webm, .apng or .gif, or give a colour R,G,B",
+            video.display()
+        )));
+    }
+    Ok(())
 }

@@ -54,6 +54,9 @@ impl Renderer {
     /// # Errors
     /// Those of the settings that do not fit the scene.
     pub fn complete(&mut self, settings: &RenderSettings, camera: Option<Camera>) -> Result<Completed> {
+        // what is chosen is chosen for what stands on the ground
+        self.scene.take_ground();
+        self.want_ground(settings.image.ground.unwrap_or_default(), settings.image.ground_height);
         self.apply_scene_settings(&settings.scene)?;
         let is_default = settings.lighting == LightingSettings::default();
         let integrator = settings.integrator().get();
@@ -132,7 +135,18 @@ impl Renderer {
             self.lighting.is_automatic = true;
         }
         self.lighting.own_light = own_light;
+
+        // the ground
+        self.lay_ground();
+        choices.extend(self.seen_from_below(&camera));
         Ok(Completed { camera, settings, chosen, choices })
+    }
+
+    /// A sentence on a ground that is seen from below.
+    fn seen_from_below(&self, camera: &Camera) -> Option<String> {
+        let height = self.scene.ground?.height;
+        let is_below = camera.camera_to_world.translation.y < height;
+        is_below.then(|| format!("ground: the camera is below it, at a height of {height} (--ground-height)"))
     }
 
     /// The options by which the scene was loaded and its file understood, as text: `--gltf-scene`,
@@ -148,6 +162,7 @@ impl Renderer {
     /// # Errors
     /// Those of [`LightingSettings::apply`].
     pub(super) fn light_or_choose(&mut self, lighting: &LightingSettings) -> Result<()> {
+        self.scene.take_ground();
         self.light(lighting)?;
         if *lighting == LightingSettings::default() && self.scene.is_dark() {
             let survey = Survey::new(&self.scene);

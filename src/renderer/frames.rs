@@ -467,7 +467,8 @@ pub fn frame_path_options(
     (job.samples.size, job.samples.spp) = (size, realtime_settings.rays_per_pixel);
     let options = settings.integrator().get().path_options(&job)?;
     let rr_depth = settings.integrators.path.rr_depth.unwrap_or(settings.frames.preset.unwrap_or_default().rr_depth());
-    Ok(options.map(|options| PathOptions { rr_depth, ..options }))
+    // frames show a ground that catches shadows as a plane
+    Ok(options.map(|options| PathOptions { rr_depth, catcher: None, ..options }))
 }
 
 /// The pipeline of frames. `paths`: options of the paths of frames of radiance.

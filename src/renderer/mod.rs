@@ -51,7 +51,7 @@ use crate::gpu::{Device, KeptPipelines};
 use crate::integrators::lighting::LightingSettings;
 use crate::output::Image;
 use crate::scene::load::{self, LoadOptions};
-use crate::scene::{Camera, Environment, Scene, SceneSettings};
+use crate::scene::{Camera, Environment, Ground, LaidGround, Scene, SceneSettings};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 use survey::own_light::OwnLight;
@@ -70,6 +70,9 @@ pub struct Renderer {
     name: String,
     scene: Scene,
     lighting: Lighting,
+    /// The ground that is wanted, and its height, and the one that the tracer has.
+    ground: (Ground, Option<f64>),
+    traced_ground: Option<LaidGround>,
     settings: DeviceSettings,
     kind: TracerKind,
     kind_reason: String,
@@ -156,6 +159,8 @@ impl Renderer {
             device,
             name: scene.name.clone(),
             lighting: Lighting::default(),
+            ground: (Ground::None, None),
+            traced_ground: None,
             scene,
             settings: settings.clone(),
             kind,
@@ -183,8 +188,26 @@ impl Renderer {
         &self.scene
     }
 
-    /// The scene without the lights that settings have added; all else goes.
+    /// Which ground images have from the next view or image on, and its height (y): by default
+    /// that of the scene's lowest point.
+    pub fn want_ground(&mut self, kind: Ground, height: Option<f64>) {
+        self.ground = (kind, height);
+    }
+
+    /// Puts the ground that is wanted under the scene.
+    fn lay_ground(&mut self) {
+        let (kind, height) = self.ground;
+        self.scene.lay_ground(kind, height);
+        if self.scene.ground != self.traced_ground {
+            // the traced scene changes
+            self.tracer = None;
+            self.traced_ground = self.scene.ground;
+        }
+    }
+
+    /// The scene without the lights and the ground that settings have added; all else goes.
     pub fn into_scene(mut self) -> Scene {
+        self.scene.take_ground();
         // removing lights cannot fail
         let _ = self.light(&LightingSettings::default());
         self.scene
@@ -255,6 +278,8 @@ impl Renderer {
         if self.lighting.settings == *settings {
             return Ok(());
         }
+        // the ground comes after lights
+        self.scene.take_ground();
         let s = &mut self.scene;
         let before = std::mem::take(&mut self.lighting);
         if before.settings != LightingSettings::default() {

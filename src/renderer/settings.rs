@@ -14,6 +14,7 @@ use crate::files;
 use crate::film::SampleSettings;
 use crate::film::camera::{self, Choice};
 use crate::integrators::aov::Aov;
+use crate::integrators::backdrop::Backdrop;
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::path::PixelFilter;
 use crate::integrators::{self, IntegratorName, IntegratorSettings, PictureOptions, RenderJob};
@@ -24,7 +25,7 @@ use crate::output::tone_map::ToneMap;
 use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::camera::ViewHeight;
-use crate::scene::{Camera, ClipPlanes, Projection, Scene, SceneSettings};
+use crate::scene::{Camera, ClipPlanes, Ground, Projection, Scene, SceneSettings};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
 use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
@@ -66,6 +67,21 @@ settings! {
         /// An .exr keeps the noisy image as noisy.Y, or noisy.R, noisy.G, noisy.B.
         denoise: Option<DenoiseChoice>,
             option(value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto"), applies(DENOISED), basic;
+        /// What is behind the scene, apart from what lights it [default: map]
+        ///
+        /// The environment map as it is (`map`) or `blurred`; a linear colour R,G,B from 0 to 1; or
+        /// nothing (`transparent`), which leaves alpha in .png and .webp outputs. A colour is for
+        /// pictures: an .exr keeps alpha. Mirrors, glass and light keep the map. Without an
+        /// environment the default is black, without alpha.
+        background: Option<Backdrop>, option(value_name = "map|blurred|R,G,B|transparent", alias = "backdrop"), applies(AppliesTo::ALL);
+        /// Put a ground under the scene: a grey plane, or a catcher of its shadows [default: none]
+        ///
+        /// A catcher shows what is behind the scene, darkened by the share of light that the scene
+        /// keeps from it; before a colour or nothing, its alpha is that share. Other surfaces see a
+        /// grey plane in its place. It is for stills of `ao` and of integrators of light.
+        ground: Option<Ground>, option(value_enum), applies(AppliesTo::ALL);
+        /// Height (y) of the ground, scene units [default: that of the scene's lowest point]
+        ground_height: Option<f64>, option(value_name = "Y", value_parser = parse_number, allow_hyphen_values = true), applies(AppliesTo::ALL);
         /// Auxiliary outputs to add to the .exr, separated by commas
         aov: Vec<Aov>, option(value_name = "LIST", value_enum, value_delimiter = ','), applies(AppliesTo::ALL);
     }
@@ -580,10 +596,38 @@ impl RenderSettings {
             )));
         }
         self.film.check(self.image.spp)?;
+        self.check_ground(frames.is_some())?;
+        if let Some(backdrop) = self.image.background {
+            let integrator = self.integrator().get();
+            backdrop.check(integrator.sees_environment(), integrator.name())?;
+        }
         if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
             return Err(Error::Usage("--aov bent is for frames in real time: add --preset".into()));
         }
         self.camera.check()
+    }
+
+    /// Checks that images have the ground. `is_frames`: they are frames in real time.
+    fn check_ground(&self, is_frames: bool) -> Result<()> {
+        let integrator = self.integrator().get();
+        let wrong = |text: String| Err(Error::Usage(text));
+        match self.image.ground.unwrap_or_default() {
+            Ground::None if self.image.ground_height.is_some() => {
+                wrong("--ground-height: there is no ground; add --ground plane, or leave it out".into())
+            }
+            Ground::Catcher if is_frames => wrong(
+                "--ground catcher is for stills: use --ground plane, or add --spp N for stills, one per frame".into(),
+            ),
+            Ground::Catcher
+                if !integrator.can(Capability::LightTransport) && !integrator.can(Capability::AmbientVisibility) =>
+            {
+                wrong(format!(
+                    "--ground catcher: --integrator {} shows no light that could be caught; use --ground plane, or --integrator path",
+                    integrator.name()
+                ))
+            }
+            Ground::None | Ground::Plane | Ground::Catcher => Ok(()),
+        }
     }
 
     /// All settings but the integrator, for editors.
@@ -657,6 +701,11 @@ impl RenderSettings {
         self.image.pixel_filter.unwrap_or_default()
     }
 
+    /// The background of camera rays that leave the scene.
+    pub fn backdrop(&self) -> Backdrop {
+        self.image.background.unwrap_or_default()
+    }
+
     /// Seed of the sampler.
     pub fn seed(&self) -> u32 {
         self.image.seed.unwrap_or_default()
@@ -676,6 +725,7 @@ impl RenderSettings {
                 ..SampleSettings::default()
             },
             settings: &self.integrators,
+            backdrop: self.backdrop(),
         }
     }
 }

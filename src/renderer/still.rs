@@ -24,6 +24,7 @@ use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::{Integrator, IntegratorReport, PictureOptions, RenderJob, Rendered};
+use crate::output::settings::Background;
 use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
@@ -56,6 +57,7 @@ pub struct Still {
     pub report: StillReport,
     integrator: &'static dyn Integrator,
     picture: PictureOptions,
+    background: Option<Background>,
 }
 
 impl Still {
@@ -69,7 +71,7 @@ impl Still {
     /// # Errors
     /// [`Error::Usage`] for an unknown format, or settings that it lacks; [`Error::Output`].
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
-        save(&self.image, self.integrator, &self.picture, files, path)
+        save(&self.image, self.integrator, &self.picture, self.background, files, path)
     }
 }
 
@@ -81,12 +83,13 @@ pub struct IntermediateImage<'a> {
     pub samples: u32,
     integrator: &'static dyn Integrator,
     picture: PictureOptions,
+    background: Option<Background>,
 }
 
 impl IntermediateImage<'_> {
     /// Writes the image as [`Still::save_with`] does, errors included.
     pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
-        save(self.image, self.integrator, &self.picture, files, path)
+        save(self.image, self.integrator, &self.picture, self.background, files, path)
     }
 }
 
@@ -94,6 +97,7 @@ fn save(
     image: &Image,
     integrator: &dyn Integrator,
     options: &PictureOptions,
+    background: Option<Background>,
     files: &FileSettings,
     path: &Path,
 ) -> Result<()> {
@@ -101,7 +105,7 @@ fn save(
     if format == ImageFormat::Exr {
         return output::exr::write_with(image, path, &files.into());
     }
-    let mut shown = match files.background {
+    let mut shown = match background {
         // the scene on black, as it is in the image
         None => integrator.picture(image, options),
         // the scene without its alpha, since displayed colours are not in proportion to linear ones
@@ -109,9 +113,9 @@ fn save(
     };
     let alpha = image.channels.iter().find(|c| c.name == "A").filter(|_| shown.f32("A").is_none());
     shown.channels.extend(alpha.cloned());
-    let of_png = FileSettings { background: files.background, ..FileSettings::default() };
-    let settings = if format == ImageFormat::Png { files } else { &of_png };
-    Picture::new(&shown, files.background, settings, path)?.save(path, files.jpeg_quality())
+    let of_others = FileSettings::default();
+    let settings = if format == ImageFormat::Png { files } else { &of_others };
+    Picture::new(&shown, background, settings, path)?.save(path, files.jpeg_quality())
 }
 
 impl Renderer {
@@ -212,7 +216,8 @@ impl Renderer {
         self.keep_pipelines();
         laps.lap("film");
         report.seconds.parts = laps.into_parts();
-        Ok(Still { image, aov: pixels, rays, report, integrator, picture })
+        let background = completed.settings.backdrop().of_pictures();
+        Ok(Still { image, aov: pixels, rays, report, integrator, picture, background })
     }
 }
 
@@ -357,7 +362,9 @@ impl<'a> StillRender<'a> {
             save: &mut |accumulated, control| {
                 let image = composer.compose(accumulated, control)?;
                 let picture = self.picture_options(accumulated);
-                save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
+                let samples = accumulated.max_spp;
+                let background = self.completed.settings.backdrop().of_pictures();
+                save(&IntermediateImage { image: &image, samples, integrator, picture, background })
             },
         };
         let rendered = integrator.render(tracer, flat, &self.job, &mut interval_control)?;

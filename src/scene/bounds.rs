@@ -34,10 +34,11 @@ fn union(a: Extremes, b: Extremes) -> Extremes {
     std::array::from_fn(|k| a[k].max(b[k]))
 }
 
-/// World-space bounds `(min, max)` over all instances, or `None` without geometry.
-pub(super) fn of_scene(scene: &Scene) -> Option<(DVec3, DVec3)> {
+/// World-space bounds `(min, max)` over all instances but those of a mesh, or `None` without
+/// geometry.
+pub(super) fn of_scene(scene: &Scene, but: Option<usize>) -> Option<(DVec3, DVec3)> {
     let shapes: Vec<Option<Shape>> = scene.meshes.par_iter().map(|m| Shape::new(&m.geometry)).collect();
-    let shape_of = |i: &Instance| shapes[i.mesh].as_ref();
+    let shape_of = |i: &Instance| shapes[i.mesh].as_ref().filter(|_| Some(i.mesh) != but);
     let blocks = || scene.instances.par_iter().with_min_len(BLOCK);
 
     // What is certain: boxes that are not turned, and some points of each other mesh.
@@ -407,11 +408,11 @@ mod tests {
         let spheres = mesh(Geometry::Spheres(spheres.collect()));
         let empty = mesh(Geometry::Spheres(Vec::new()));
         let mut scene = scene(vec![triangles(), spheres, empty], std::iter::empty());
-        assert_eq!(of_scene(&scene), None);
+        assert_eq!(of_scene(&scene, None), None);
         for count in [1, 2, 3, 40, 1000] {
             let place = |k: usize, object_to_world| Instance { name: String::new(), mesh: k % 3, object_to_world };
             scene.instances = (0..count).map(|k| place(k, numbers.transform())).collect();
-            let ((lo, hi), (low, high)) = (of_scene(&scene).unwrap(), slow(&scene));
+            let ((lo, hi), (low, high)) = (of_scene(&scene, None).unwrap(), slow(&scene));
             assert!(
                 (lo - low).abs().max_element().max((hi - high).abs().max_element()) < 1e-12,
                 "{count}: {lo} {low} {hi} {high}"
@@ -427,7 +428,7 @@ mod tests {
         let at = DVec3::new(1e3, -0.1, 7.7);
         for matrix in [DMat3::IDENTITY, quarter] {
             let scene = scene(vec![mesh(triangle.clone())], [DAffine3::from_mat3_translation(matrix, at)].into_iter());
-            assert_eq!(of_scene(&scene).unwrap(), slow(&scene));
+            assert_eq!(of_scene(&scene, None).unwrap(), slow(&scene));
         }
     }
 

@@ -14,7 +14,9 @@ pub mod camera_path;
 pub mod environments;
 pub mod export;
 pub mod fingerprint;
+pub mod ground;
 pub mod inventory;
+pub(crate) mod laid_ground;
 pub mod light;
 pub mod light_spec;
 pub mod lights;
@@ -32,6 +34,7 @@ pub mod texture;
 pub use animation::AnimationRig;
 pub use camera::{Camera, ClipPlanes, Projection};
 pub use camera_path::CameraPath;
+pub use ground::{Ground, LaidGround};
 pub use light::{Environment, EnvironmentMap, Light, Portal};
 pub use lights::LightKind;
 pub use material::{AlphaMode, Material, TextureSlot};
@@ -168,6 +171,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Environment light.
     pub environment: Environment,
+    /// The ground that settings have put under it ([`Scene::lay_ground`]).
+    pub ground: Option<LaidGround>,
     /// Render settings of the file.
     pub hints: RenderHints,
     /// Animations of the scene; `None` for a static scene.
@@ -202,6 +207,11 @@ impl Scene {
         self.instances.iter().enumerate().filter(|(k, _)| !self.hidden.contains(k)).map(|(_, instance)| instance)
     }
 
+    /// The instances but a ground that settings have added, which is the last.
+    pub fn standing(&self) -> &[Instance] {
+        &self.instances[..self.instances.len() - usize::from(self.ground.is_some())]
+    }
+
     /// Whether nothing in it emits light: it has no environment, no lights, and no surface that
     /// emits or shows its colour unlit.
     pub fn is_dark(&self) -> bool {
@@ -219,10 +229,15 @@ impl Scene {
         self.environment == Environment::Black && self.lights.iter().all(is_off) && !self.shown_instances().any(shines)
     }
 
-    /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for
-    /// an empty scene.
+    /// World-space bounds `(min, max)` of the vertices and spheres of all instances but a ground
+    /// that settings have added, or `None` for an empty scene.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        bounds::of_scene(self)
+        bounds::of_scene(self, self.ground.map(|ground| ground.mesh))
+    }
+
+    /// As [`Scene::bounds`], with such a ground.
+    pub fn bounds_with_ground(&self) -> Option<(DVec3, DVec3)> {
+        bounds::of_scene(self, None)
     }
 
     /// Whether a ray that leaves the scene may see an emitter: an environment, or a directional

@@ -659,6 +659,7 @@ impl App {
             self.lighting.light.clone_from(&self.given.lighting.light);
             let file = &mut self.settings.scene;
             (file.material, file.hide, file.only) = (Vec::new(), Vec::new(), Vec::new());
+            self.settings.image.ground_height = self.given.image.ground_height;
             if self.exposure.1.is_some() && self.settings.picture.exposure == self.exposure.1 {
                 self.settings.picture.exposure = self.given.picture.exposure;
             }
@@ -1015,6 +1016,7 @@ impl App {
             device: self.device_settings.clone(),
             meaning: self.settings.scene.clone(),
             lighting: self.lighting.clone(),
+            ground: (self.settings.image.ground.unwrap_or_default(), self.settings.image.ground_height),
             animation: self.playback.animation,
             time: self.playback.time,
             camera: self.control.as_ref().map(|c| c.camera().clone()),

@@ -15,7 +15,7 @@ use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
 use crate::scene::load::GeometryOptions;
-use crate::scene::{Camera, Material, SceneSettings};
+use crate::scene::{Camera, Ground, Material, SceneSettings};
 use crate::tracer::DeviceSettings;
 
 /// Index of an image: the first, the second or the truth ([`TRUTH`]).
@@ -41,6 +41,8 @@ pub struct Request {
     pub meaning: SceneSettings,
     /// Lights beside the scene's.
     pub lighting: LightingSettings,
+    /// The ground under the scene, and its height.
+    pub ground: (Ground, Option<f64>),
     /// The animation to play, an index.
     pub animation: Option<usize>,
     /// Time of the animation, seconds.
@@ -82,7 +84,7 @@ impl Request {
     /// Returns true if another request is of the same scene in the same pose and light, seen by the
     /// same camera at the same size on the same device.
     pub fn shows_same_view(&self, other: &Self) -> bool {
-        let view = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size);
+        let view = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size, r.ground);
         let lit =
             |r: &Self| (r.scene.clone(), r.meaning.clone(), r.device.clone(), r.lighting.clone(), r.camera.clone());
         view(self) == view(other) && lit(self) == lit(other)

@@ -8,6 +8,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::realtime::{FilterKind, Preset, Technique as AoTechnique};
 use crate::renderer::RenderSettings;
 use crate::sampling::Sequence;
+use crate::scene::Ground;
 use crate::settings::Capability;
 
 /// Technique that a view shows.
@@ -212,6 +213,23 @@ impl Technique {
             settings.picture.tone_map.get_or_insert(ToneMap::Agx);
         }
         settings.clear_unused();
+        settings.image.background =
+            settings.image.background.filter(|b| b.hides_environment() || self.sees_environment());
+        if settings.image.ground == Some(Ground::Catcher) && !self.catches_shadows() {
+            settings.image.ground = Some(Ground::Plane);
+        }
         settings
+    }
+
+    /// Whether its images may show an environment.
+    fn sees_environment(self) -> bool {
+        matches!(self, Self::Frames(integrator) | Self::Still(integrator) if integrator.get().sees_environment())
+    }
+
+    /// Whether its images can show what a ground catches, and not only a plane: those of stills of
+    /// light and of ambient occlusion.
+    pub fn catches_shadows(self) -> bool {
+        let catches = |i: IntegratorName| i.can(Capability::LightTransport) || i.can(Capability::AmbientVisibility);
+        matches!(self, Self::Still(integrator) if catches(integrator))
     }
 }

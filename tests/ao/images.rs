@@ -104,7 +104,8 @@ fn gpu_shared_camera_rays() {
         let scene = scene(name);
         let camera = &scene.cameras[0];
         let samples = SampleSettings::new([96, 72], spp, 3);
-        let options = AoOptions { samples, occlusion: Occlusion::new(f64::INFINITY, falloff), rays };
+        let options =
+            AoOptions { samples, occlusion: Occlusion::new(f64::INFINITY, falloff), rays, ..Default::default() };
         compare_with_oracle(&device, &format!("{name}, {rays} rays"), &scene, camera, &options);
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &scene);

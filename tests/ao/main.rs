@@ -6,6 +6,7 @@ mod common;
 
 mod aov;
 mod baking;
+mod catcher;
 mod closed_forms;
 mod film;
 mod images;

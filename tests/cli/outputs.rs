@@ -116,14 +116,23 @@ fn gpu_pictures_of_a_still() {
         let mapped = if alpha[p] > 0.0 { 1.0 - (-f64::from(r[p]) / f64::from(alpha[p])).exp() } else { 0.0 };
         assert!((f64::from(pixel[0]) - mapped * 65535.0).abs() < 1.0, "{p}: {pixel:?} {mapped}");
     }
-    // an environment is behind the scene already
-    let sky = ["render", "builtin:plane", "--integrator", "path", "--environment", "1,1,1", "-o", &png];
-    refuses(&[&sky[..], &["--background", "transparent"]].concat(), 64, "--background has no effect: the environment");
-    refuses(
-        &["render", "builtin:plane", "--integrator", "ao-sky", "-o", &png, "--background", "0,0,1"],
-        64,
-        "--background",
-    );
+    // an environment lights the scene and is not behind it
+    let (exr, blue) = (at("e.exr"), at("blue.png"));
+    let sky = ["render", "builtin:spheres:30", "--size", "48x32", "--spp", "4", "--integrator", "direct", "--json"];
+    let lit = |more: &[&str]| json(&run(&[&sky[..], &["--environment", "0.5,0.5,0.5"], more].concat()));
+    lit(&["-o", &exr, "--backdrop", "hidden"]);
+    lit(&["-o", &blue, "--background", "0,0,1"]);
+    let (image, picture) = (load(&exr), load(&blue));
+    let [r, b, alpha] = ["R", "B", "A"].map(|name| image.f32(name).unwrap());
+    let (red, above) = (picture.f32("R").unwrap(), picture.f32("B").unwrap());
+    assert!(alpha.contains(&0.0) && alpha.contains(&1.0) && image.metadata("background") == Some("hidden"));
+    for p in 0..r.len() {
+        assert!((alpha[p] > 0.0 || r[p] == 0.0) && (red[p] - r[p]).abs() < 0.01, "{p}: {} {}", r[p], red[p]);
+        assert!((above[p] - (b[p] + 1.0 - alpha[p])).abs() < 0.01, "{p}: {} {}", b[p], above[p]);
+    }
+    // what shows no environment has none to blur
+    let blurred = ["render", "builtin:plane", "--integrator", "ao-sky", "-o", &png, "--background", "blurred"];
+    refuses(&blurred, 64, "--integrator ao-sky shows no environment");
     // depths in 16 bits
     let (depth, numbers) = (at("d.png"), at("d.exr"));
     render(&["--spp", "1", "-o", &numbers, "--aov", "depth", "--depth-image", &depth, "--png-bits", "16"]);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use skylit::output::settings::{Background, ExrCompression, FileSettings, PngBits, PngEncoding};
+use skylit::output::settings::{Background, ExrCompression, FileSettings, PngBits, PngEncoding, check_alpha};
 
 #[test]
 fn backgrounds_are_text() {
@@ -27,13 +27,6 @@ fn settings_need_a_file_that_has_them() {
     let cases = [
         (FileSettings { png_bits: Some(PngBits::Sixteen), ..none.clone() }, "a.exr", "a.png", "--png-bits"),
         (FileSettings { png_encoding: Some(PngEncoding::Linear), ..none.clone() }, "a.apng", "a.PNG", "--png-encoding"),
-        (FileSettings { background: Some(Background::Transparent), ..none.clone() }, "a.exr", "a.apng", "--background"),
-        (
-            FileSettings { background: Some(Background::Transparent), ..none.clone() },
-            "a.jpeg",
-            "a.webp",
-            "--background",
-        ),
         (FileSettings { jpeg_quality: Some(3), ..none.clone() }, "a.webp", "a.jpg", "--jpeg-quality"),
         (FileSettings { exr_half: true, ..none.clone() }, "a.png", "a.exr", "--exr-half"),
         (
@@ -46,6 +39,10 @@ fn settings_need_a_file_that_has_them() {
     for (settings, without, with, option) in cases {
         assert_eq!(check(&settings, &[with]), Ok(()), "{option}");
         assert!(check(&settings, &[without]).is_err_and(|e| e.starts_with(option)), "{option}");
+    }
+    for (file, has_alpha) in [("a.jpeg", false), ("a.mp4", false), ("a.webp", true), ("a.exr", true)] {
+        assert_eq!(check_alpha(Some(Background::Transparent), &[file.into()]).is_ok(), has_alpha, "{file}");
+        assert!(check_alpha(Some(Background::Colour([0.0; 3])), &[file.into()]).is_ok());
     }
     let b44 = FileSettings { exr_compression: Some(ExrCompression::B44), ..none };
     assert!(check(&b44, &["a.exr"]).is_err_and(|e| e.contains("add --exr-half")));

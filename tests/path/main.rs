@@ -5,8 +5,10 @@
 mod common;
 
 mod appearance;
+mod backdrop;
 mod bsdf;
 mod camera;
+mod catcher;
 // these run the program
 #[cfg(feature = "cli")]
 mod cli;

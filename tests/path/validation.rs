@@ -6,6 +6,7 @@ use crate::common::new_device;
 use glam::{Affine2, Vec2, Vec4};
 use skylit::accel::features::SceneFeatures;
 use skylit::integrators::ao::{Hemisphere, Occlusion};
+use skylit::integrators::backdrop::Backdrop;
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
 use skylit::integrators::path::points::PointLight;
 use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
@@ -17,7 +18,7 @@ use skylit::scene::material::{
     AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Retroreflection, Sheen, Specular, TextureSlot,
     Transmission, VolumeScatter,
 };
-use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
+use skylit::scene::{EnvironmentMap, Filter, Ground, Portal, Sphere, Texture, Wrap};
 
 /// All BSDFs, textures in all slots, alpha of both kinds, and lights of all kinds: so many that a tree chooses among them.
 fn everything() -> Scene {
@@ -196,12 +197,24 @@ fn gpu_kernels_of_all_features_are_valid() {
     // clear walls exclude a sample of each group of lights
     let both = Scene { lights: vec![scene.lights[3].clone()], ..little.clone() };
     holds(&tracers(&device), &both, all_needs, &base);
+    let blurred = PathOptions { backdrop: Backdrop::Blurred, ..base.clone() };
+    holds(
+        &[TracerKind::Compute],
+        &Scene { environment: scene.environment.clone(), ..little.clone() },
+        all_needs,
+        &blurred,
+    );
+    let mut caught = both.clone();
+    caught.lay_ground(Ground::Catcher, None);
+    let catcher = PathOptions { catcher: caught.catcher(), ..base.clone() };
+    holds(&tracers(&device), &caught, all_needs, &catcher);
     for options in [
         PathOptions { strategy: Strategy::Light, ..base.clone() },
         PathOptions { strategy: Strategy::Cosine, ..base.clone() },
         PathOptions { strategy: Strategy::Uniform, ..base.clone() },
         PathOptions { specular_only: true, ..base.clone() },
         PathOptions { background_only: true, ..base.clone() },
+        PathOptions { backdrop: Backdrop::Transparent, ..base.clone() },
         PathOptions { view: Some(View::Normals), ..base.clone() },
     ] {
         holds(&[TracerKind::Compute], &little, all_needs, &options);

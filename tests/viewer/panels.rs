@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
+use skylit::integrators::backdrop::Backdrop;
+use skylit::realtime::Preset;
 use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
+use skylit::scene::Ground;
 use skylit::scene::load::{GeometryOptions, NormalSource, Projection};
 use skylit::settings::Length;
 use skylit::viewer::app::{App, Arrangement, Second};
@@ -893,6 +896,41 @@ fn environments_are_chosen_and_turned() {
     alone.click("The scene's own");
     let lighting = alone.mailbox.peek().lighting;
     assert_eq!((lighting.environment, lighting.environment_turn, lighting.environment_scale), (None, None, None));
+}
+
+/// Background and ground are chosen in the panel of light, and each technique gets what it can show.
+#[test]
+fn backgrounds_and_grounds_are_chosen() {
+    let mut alone = loaded();
+    alone.harness.get_by_label("Light").click();
+    alone.harness.run_steps(10);
+    let choose = |alone: &mut Alone, list: &str, item: &str| {
+        alone.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, list).click();
+        alone.harness.run_steps(5);
+        alone.click(item);
+        alone.mailbox.peek()
+    };
+    alone.change(|app| app.first = Technique::Still("path".parse().unwrap()));
+    let request = choose(&mut alone, "Background", "Blurred");
+    assert_eq!(request.panes[0].image.background, Some(Backdrop::Blurred));
+    let request = choose(&mut alone, "Ground", "Shadow catcher");
+    assert_eq!((request.panes[0].image.ground, request.ground), (Some(Ground::Catcher), (Ground::Catcher, None)));
+    let settings = alone.harness.state().render_settings(RenderedMotion::Nothing).unwrap();
+    let flags = settings.flags().join(" ");
+    assert!(flags.contains("--background blurred") && flags.contains("--ground catcher"), "{flags}");
+
+    // ambient occlusion has no environment to blur, and frames in real time show a plane
+    alone.change(|app| app.first = Technique::Preset(Preset::Balanced));
+    let pane = alone.mailbox.peek().panes[0].clone();
+    assert_eq!((pane.image.background, pane.image.ground), (None, Some(Ground::Plane)));
+    assert!(alone.shows("Stills show what the ground catches; frames in real time show a plane."));
+    pane.check().unwrap();
+    let request = choose(&mut alone, "Background", "Colour");
+    assert!(matches!(request.panes[0].image.background, Some(Backdrop::Colour(_))));
+    let request = choose(&mut alone, "Background", "The environment");
+    assert_eq!(request.panes[0].image.background, None);
+    let request = choose(&mut alone, "Ground", "None");
+    assert_eq!((request.panes[0].image.ground, request.ground.0), (None, Ground::None));
 }
 
 /// Writes a program that is `script`. Another process writes it: a file that this one has open for writing would be so in the programs that other

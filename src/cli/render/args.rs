@@ -204,6 +204,7 @@ impl RenderArgs {
     fn check_files(&self) -> Result<()> {
         let (files, film) = (&self.files, &self.settings.film);
         files.check(&self.output, self.depth_image.as_deref())?;
+        self.settings.backdrop().check_files(&self.output, self.settings.integrator().get().sees_environment())?;
         let shown = self.settings.frames.show.unwrap_or_default();
         if self.settings.realtime_setting().is_some() && files.has_deep_png() && shown != DisplayMode::Result {
             return Err(Error::Usage(format!(

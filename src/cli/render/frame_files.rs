@@ -16,6 +16,7 @@ pub struct FrameFiles {
     animations: Vec<AnimationWriter>,
     colour: Colour,
     settings: FileSettings,
+    background: Option<Background>,
 }
 
 /// Images of a frame that are written. Those that no file needs are `None`.
@@ -40,16 +41,17 @@ impl FrameFiles {
         fps: f64,
         colour: Colour,
         settings: &FileSettings,
+        background: Option<Background>,
     ) -> Result<Self> {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| is_animation(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
         for path in files {
             if ImageFormat::from_path(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }
         }
-        let animation = Animation { size, colour: on_background(colour, settings.background), frames, fps };
+        let animation = Animation { size, colour: on_background(colour, background), frames, fps };
         let start = |p: &PathBuf| AnimationWriter::create(p, animation);
         let animations = animations.iter().map(start).collect::<Result<_>>()?;
-        Ok(Self { images, pictures, animations, colour, settings: settings.clone() })
+        Ok(Self { images, pictures, animations, colour, settings: settings.clone(), background })
     }
 
     /// Writes a frame: its channels to .exr files and to .png files that 8 bits do not suffice for,
@@ -68,7 +70,7 @@ impl FrameFiles {
             bytes.extend(words.chunks_exact(4).flat_map(|word| &word[..channels]));
         })?;
         let mut displayed = Picture::of_bytes(bytes, size, self.colour)?;
-        if let (Some(background), Some(coverage)) = (self.settings.background, &contents.coverage) {
+        if let (Some(background), Some(coverage)) = (self.background, &contents.coverage) {
             displayed = displayed.on(background, coverage)?;
         }
         for path in &self.pictures {
@@ -78,8 +80,8 @@ impl FrameFiles {
             });
             match deep {
                 Some(image) => {
-                    let image = if self.settings.background.is_some() { &picture::unassociated(image) } else { image };
-                    Picture::new(image, self.settings.background, &self.settings, &path)?
+                    let image = if self.background.is_some() { &picture::unassociated(image) } else { image };
+                    Picture::new(image, self.background, &self.settings, &path)?
                         .save(&path, self.settings.jpeg_quality())?;
                 }
                 None => displayed.save(&path, self.settings.jpeg_quality())?,

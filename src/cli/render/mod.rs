@@ -138,10 +138,6 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
-    if args.files.background.is_some() && renderer.shows_environment(&args.settings)? {
-        let what = "--background has no effect: the environment is behind the scene, in its colours; leave --background out, or render without an environment";
-        return Err(Error::Usage(what.into()).into());
-    }
 
     // a still whose partial images are written, too, has more files
     let intervals =
@@ -211,8 +207,10 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     let mut control = CliControl::new(args, console, &renderer);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = frames.colour();
+    let background = args.settings.backdrop().of_pictures();
+    let count = range.end - range.first;
     let mut files =
-        FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour, &args.files)?;
+        FrameFiles::create(&args.output, frames.size(), count, frames.fps(), colour, &args.files, background)?;
     let (mut done, all, mut write_seconds) = (0, u64::from(frames.count()), 0.0);
 
     // only frames that are kept are read back
@@ -220,7 +218,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
         if frame.kept {
             let write_start = Instant::now();
             let image = if args.needs_channels() { Some(frames.image(&mut SilentControl)?) } else { None };
-            let coverage = if args.files.background.is_some() { Some(frames.coverage()?) } else { None };
+            let coverage = if background.is_some() { Some(frames.coverage()?) } else { None };
             let deep = image.as_ref().filter(|_| args.files.has_deep_png()).map(|image| frames.picture(image));
             let contents = FrameContents { image: image.as_ref(), deep, shown: frames.displayed(), coverage };
             files.add(frame.number, frames.size(), &contents)?;

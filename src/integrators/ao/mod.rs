@@ -31,6 +31,7 @@ use crate::interface::records::ao::AoParams;
 use crate::interface::records::film::FilmParams;
 use crate::output::Image;
 use crate::ray::Ray;
+use crate::scene::Ground;
 use crate::settings::Capability;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::stream::launch_rays;
@@ -51,11 +52,14 @@ pub struct AoOptions {
     pub occlusion: Occlusion,
     /// Consecutive samples of a pixel that share a camera ray: a power of two.
     pub rays: u32,
+    /// The material of a ground that catches shadows: it shows what the scene occludes, and no
+    /// surface ([`crate::scene::Scene::catcher`]).
+    pub catcher: Option<u32>,
 }
 
 impl Default for AoOptions {
     fn default() -> Self {
-        Self { samples: SampleSettings::default(), occlusion: Occlusion::default(), rays: 1 }
+        Self { samples: SampleSettings::default(), occlusion: Occlusion::default(), rays: 1, catcher: None }
     }
 }
 
@@ -85,6 +89,7 @@ impl AmbientOcclusion {
             samples: job.samples.clone(),
             occlusion: ao.occlusion(),
             rays: ao.ao_rays.unwrap_or_else(|| default_rays(&job.samples)),
+            catcher: job.scene.catcher(),
         }
     }
 }
@@ -144,7 +149,7 @@ impl Integrator for AmbientOcclusion {
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
-        let AoOptions { samples, occlusion, rays } = Self::options(job);
+        let AoOptions { samples, occlusion, rays, catcher } = Self::options(job);
         let SampleSettings {
             size: _,
             spp: _,
@@ -159,6 +164,7 @@ impl Integrator for AmbientOcclusion {
         // none of an image whose samples have a camera ray each, as images had before there was a
         // choice
         identity.push(("ao.rays", (rays > 1).then(|| rays.to_string())));
+        identity.push(("ground", catcher.map(|_| Ground::Catcher.to_string())));
         identity.push(("pixel_filter", Some(pixel_filter.to_string())));
         identity
     }
@@ -234,7 +240,8 @@ pub fn render(
     let samples = &options.samples;
     let most = max_rays(launch_rays(&device.info), samples.size, samples.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = samples.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
-    let rays = AoRays::new(tracer, options.occlusion, most, sample_bits, options.rays.max(1).ilog2())?;
+    let camera_shift = options.rays.max(1).ilog2();
+    let rays = AoRays::new(tracer, options.occlusion, most, sample_bits, camera_shift, options.catcher)?;
     let mut estimator = AoEstimator {
         own: rays.params(options.occlusion.record(), camera),
         has_entry_points: rays.has_entry_points(camera),

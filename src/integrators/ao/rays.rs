@@ -3,7 +3,8 @@
 use super::{NO_HIT, Occlusion};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::gpu::{Buffer, Memory, Recorder};
+use crate::gpu::{Buffer, Memory, Recorder, Specialization};
+use crate::interface::constants;
 use crate::interface::records::ao::{AoParams, OcclusionRecord};
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::entry_points::EntryPoints;
@@ -18,6 +19,7 @@ pub struct AoRays {
     queue: RayQueue,
     samples: Buffer,
     camera_shift: u32,
+    catcher: Option<u32>,
 }
 
 /// The streams that samples need: without a falloff any hit ends an occlusion ray.
@@ -28,21 +30,33 @@ pub fn streams(occlusion: Occlusion) -> [&'static StreamShaders; 2] {
 
 impl AoRays {
     /// For launches of at most `most` samples, and at most 2^`sample_bits` of a pixel, of which
-    /// 2^`camera_shift` consecutive ones share a camera ray.
+    /// 2^`camera_shift` consecutive ones share a camera ray. `catcher`: [`super::AoOptions`].
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(tracer: &Tracer, occlusion: Occlusion, most: u32, sample_bits: u32, camera_shift: u32) -> Result<Self> {
+    pub fn new(
+        tracer: &Tracer,
+        occlusion: Occlusion,
+        most: u32,
+        sample_bits: u32,
+        camera_shift: u32,
+        catcher: Option<u32>,
+    ) -> Result<Self> {
         let device = tracer.device();
         let [primary, occlusion] = streams(occlusion);
-        let primary = tracer.stream(primary)?;
+        let mut constants = Specialization::default();
+        if catcher.is_some() {
+            constants = constants.set(constants::HAS_CATCHER, true);
+        }
+        let primary = tracer.specialized(primary, &constants)?;
         Ok(Self {
             entry_points: EntryPoints::new(tracer, &primary, most, sample_bits.saturating_sub(camera_shift))?,
             primary,
-            occlusion: tracer.stream(occlusion)?,
+            occlusion: tracer.specialized(occlusion, &constants)?,
             queue: RayQueue::new(device, most)?,
             samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * u64::from(most), Memory::Device)?,
             camera_shift,
+            catcher,
         })
     }
 
@@ -64,6 +78,7 @@ impl AoRays {
             samples: self.samples.address(),
             queue: self.queue.record(),
             camera_shift: self.camera_shift,
+            catcher: self.catcher.unwrap_or_default(),
             entry_points: match &self.entry_points {
                 Some(lists) if self.has_entry_points(camera) => lists.address(),
                 _ => 0,

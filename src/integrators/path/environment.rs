@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DMat3, Vec3};
 use rayon::prelude::*;
 
+use super::blur;
 use super::lights::brightness;
 use super::params::EnvironmentRecord;
 use crate::error::Result;
@@ -24,7 +25,8 @@ pub(super) struct DeviceEnvironment {
 
 impl DeviceEnvironment {
     /// Uploads the environment. `compensated`: use MIS compensation, which needs BSDF sampling.
-    pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool) -> Result<Self> {
+    /// `blurs`: camera rays show it blurred.
+    pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool, blurs: bool) -> Result<Self> {
         let plain = |c: Vec3| Self { map: EnvironmentRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
         let map = match environment {
             Environment::Black => return Ok(plain(Vec3::ZERO)),
@@ -48,21 +50,27 @@ impl DeviceEnvironment {
             let radiance = &map.radiance[first as usize..][..out.len()];
             out.par_iter_mut().zip(radiance).for_each(|(texel, c)| *texel = c.extend(weight(c) as f32).to_array());
         })?;
+        let blurred = blurs.then(|| upload_blurred(device, map)).transpose()?;
         let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
+            blurred: blurred.as_ref().map_or(0, Buffer::address),
             width: map.width,
             height: map.height,
             to_map: rows(&map.to_map),
-            ..Default::default()
         };
         Ok(Self {
             map: record,
             factor: map.factor,
             mean: totals.mean_radiance * map.factor,
-            _buffers: vec![texels, table],
+            _buffers: [texels, table].into_iter().chain(blurred).collect(),
         })
     }
+}
+
+/// Uploads what camera rays show of a blurred map.
+fn upload_blurred(device: &Arc<Device>, map: &EnvironmentMap) -> Result<Buffer> {
+    Buffer::from_slice(device, "blurred environment", &blur::blurred(map))
 }
 
 /// A rotation as shaders read it.

@@ -227,7 +227,8 @@ impl Integrator for PathVariant {
 
     /// Only if the environment is black, and no lens or wide filter sees beyond a pixel's area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
-        let black = !self.shows_environment(job.scene);
+        let is_white_sky = matches!(self.kind, Kind::WhiteSky);
+        let black = !self.shows_environment(job.scene) || job.backdrop.hides_environment() && !is_white_sky;
         let settings = &job.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
         black && is_pinhole && job.samples.pixel_filter.is_within_pixel()

@@ -9,6 +9,7 @@ use super::settings::{PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::gpu::Device;
+use crate::integrators::backdrop::Backdrop;
 use crate::interface::{LightKind, LightKinds, PathFeature, PathFeatures};
 use crate::scene::Environment;
 
@@ -33,7 +34,8 @@ impl LightSources {
             None if options.white_sky.is_some() => &white,
             None => &flat.scene.environment,
         };
-        let environment = DeviceEnvironment::new(device, environment, options.strategy == Strategy::Mis)?;
+        let blurs = options.backdrop == Backdrop::Blurred;
+        let environment = DeviceEnvironment::new(device, environment, options.strategy == Strategy::Mis, blurs)?;
         let mut builder = None;
         let lights = match options.white_sky {
             _ if options.view.is_some() => Lights::default(),

@@ -9,6 +9,7 @@
 
 pub mod ambient;
 mod ambient_light;
+mod blur;
 mod buffers;
 mod environment;
 mod features;
@@ -245,7 +246,7 @@ struct PathEstimator {
     /// Numbers of rays traced at each bounce, and of its shadow rays.
     counts: Buffer,
     max_depth: u32,
-    samples_lights: bool,
+    traces_shadows: bool,
     traced: PathCounts,
     /// Bounces of the longest path of the launch before.
     bounces_before: u32,
@@ -339,6 +340,8 @@ impl PathEstimator {
         let LightSources { environment, lights, builder } = sources;
         let lights = DeviceLights::new(device, lights)?;
         let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
+        // what is behind a catcher comes with its shadow rays, which there are without lights, too
+        let traces_shadows = samples_lights || options.catches();
 
         // Buffers.
         let counts = Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?;
@@ -353,7 +356,7 @@ impl PathEstimator {
         };
         let (mut buffers, base) = PathBuffers::new(device, most, features, stores_sky_pdfs, base)?;
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
-        let transmits = samples_lights && features.contains(PathFeature::ClearWalls);
+        let transmits = traces_shadows && features.contains(PathFeature::ClearWalls);
         let walls = transmits.then(|| TransmittedShadowRays::new(tracer, &constants, most)).transpose()?;
         let behind_walls = walls.as_ref().map(|w| (w.later.record(), w.contributions.address()));
         let (records, of_first_surface) = buffers.launch_params(behind_walls, base);
@@ -379,7 +382,7 @@ impl PathEstimator {
             volumes: features.contains(PathFeature::Media).then(|| ClosedVolumes::new(flat)),
             counts,
             max_depth: options.bounces(),
-            samples_lights,
+            traces_shadows,
             traced: PathCounts::default(),
             bounces_before: 0,
             lights,
@@ -450,7 +453,7 @@ impl PathEstimator {
 
     /// Records the shadow rays that a vertex generated; their number is read back from `slot`.
     fn record_shadow(&self, wavefront: &Wavefront, r: &mut Recorder, push: Push, most: u32, slot: u32) {
-        if !self.samples_lights {
+        if !self.traces_shadows {
             return;
         }
         r.barrier();
@@ -489,7 +492,7 @@ impl PathEstimator {
     /// Traces shadow rays that have passed a thin wall, wall after wall, until none is left.
     fn trace_behind_walls(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
-        let Some(walls) = self.walls.as_ref().filter(|_| self.samples_lights) else { return Ok(timings) };
+        let Some(walls) = self.walls.as_ref().filter(|_| self.traces_shadows) else { return Ok(timings) };
         let queues = [&self.buffers.shadow_queue, &walls.later];
         // the shadow rays of vertices went from the first queue to the second
         let mut from = 1;

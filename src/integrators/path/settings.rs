@@ -12,8 +12,9 @@ use super::{PixelFilter, View};
 use crate::error::{Error, Result};
 use crate::film::SampleSettings;
 use crate::integrators::RenderJob;
+use crate::integrators::backdrop::Backdrop;
 use crate::interface::{PathFeature, PathOptionsRecord};
-use crate::scene::Projection;
+use crate::scene::{Ground, Projection};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
 use crate::settings::{AppliesTo, Capability, choices, settings};
@@ -162,6 +163,11 @@ pub struct PathOptions {
     pub ambient: Option<Ambient>,
     /// The environment is seen by the camera and lights no surface.
     pub background_only: bool,
+    /// The background of camera rays that leave the scene.
+    pub backdrop: Backdrop,
+    /// The material of a ground that catches shadows: camera rays see what is behind it, darkened
+    /// by what the scene hides of its light ([`crate::scene::Scene::catcher`]).
+    pub catcher: Option<u32>,
     /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
     pub view: Option<View>,
     /// Paths begin at given points of surfaces, not at the camera ([`super::points`]).
@@ -192,6 +198,8 @@ impl Default for PathOptions {
             white_sky: None,
             ambient: None,
             background_only: false,
+            backdrop: Backdrop::Map,
+            catcher: None,
             view: None,
             begins_at_points: false,
             texture_filter: TextureFilter::Bilinear,
@@ -249,6 +257,8 @@ impl PathOptions {
             white_sky,
             ambient,
             background_only,
+            backdrop,
+            catcher,
             view,
             // no image of a camera
             begins_at_points: _,
@@ -263,6 +273,12 @@ impl PathOptions {
         let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
         let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
         let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
+        // samples are the same before any colour, and before none
+        let seen = match backdrop {
+            Backdrop::Map => "map",
+            Backdrop::Blurred => "blurred",
+            Backdrop::Colour(_) | Backdrop::Transparent => "hidden",
+        };
         let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
         vec![
             ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
@@ -278,6 +294,8 @@ impl PathOptions {
             ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
             ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
             ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
+            ("background", (*backdrop != Backdrop::Map).then(|| seen.to_owned()), json!(seen)),
+            ("ground", catcher.map(|_| Ground::Catcher.to_string()), json!(catcher.map(|_| Ground::Catcher))),
             // the name of the integrator says it in metadata
             ("view", None, json!(view)),
         ]
@@ -361,9 +379,17 @@ impl PathOptions {
             texture_filter: settings.texture_filter.unwrap_or_default(),
             lens: settings.lens(job.camera.projection)?,
             kernel: settings.path_kernel.unwrap_or_default(),
+            backdrop: job.backdrop,
+            catcher: job.scene.catcher(),
             ..Self::default()
         };
         options.set_numbers(settings);
+        if options.catcher.is_some() && !options.strategy.samples_lights() {
+            return Err(Error::Usage(format!(
+                "--ground catcher needs light samples, and --sampling {} takes none: leave --sampling out",
+                options.strategy
+            )));
+        }
         Ok(options)
     }
 
@@ -389,6 +415,9 @@ impl PathOptions {
             (PathFeature::Ambient, self.ambient.is_some()),
             (PathFeature::OccludedLight, self.occludes_all()),
             (PathFeature::BackgroundOnly, self.background_only),
+            (PathFeature::HiddenBackground, self.backdrop.hides_environment()),
+            (PathFeature::BlurredBackground, self.backdrop == Backdrop::Blurred),
+            (PathFeature::Catcher, self.catches()),
             (PathFeature::View, self.view.is_some()),
             (PathFeature::SurfacePoints, self.begins_at_points),
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
@@ -402,6 +431,11 @@ impl PathOptions {
         self.ambient.is_some_and(|a| a.occluded == OccludedLight::All)
     }
 
+    /// Returns true if camera rays meet a ground that catches shadows.
+    pub(super) fn catches(&self) -> bool {
+        self.catcher.is_some() && self.view.is_none() && !self.begins_at_points
+    }
+
     /// Maximum number of bounces.
     pub(super) fn bounces(&self) -> u32 {
         if self.view.is_some() { 0 } else { self.max_depth.min(MAX_DEPTH) }
@@ -413,6 +447,7 @@ impl PathOptions {
             max_depth: self.bounces(),
             view: self.view.map_or(0, |v| v as u32),
             options: self.numbers(),
+            catcher: self.catcher.unwrap_or_default(),
             albedo: self.white_sky.unwrap_or(0.0),
             ambient_color: self.ambient.map_or([0.0; 3], |a| a.color.to_array()),
             occludes_all: self.occludes_all().into(),

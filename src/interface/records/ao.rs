@@ -11,6 +11,8 @@ records! {
         /// Bytes of a bundle's list: per entry point its block and the least distance to it, near
         /// to far, then a pair of `INVALID`.
         ENTRY_LIST_BYTES: uint = 128;
+        /// Bit of the tag of an occlusion ray from a ground that catches shadows.
+        CAUGHT: uint = 2147483648;
     };
 
     /// Which hits occlude a surface point, and how much.
@@ -40,5 +42,9 @@ records! {
         ray_dump: address,
         /// Output for occlusion rays, or 0.
         occlusion_dump: address,
+        /// The material of a ground that catches shadows, with `HAS_CATCHER`.
+        catcher: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 }

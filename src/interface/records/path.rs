@@ -17,6 +17,10 @@ records! {
         SIGNAL_UNKNOWN: float = -1.0;
         /// No distance yet.
         SIGNAL_PENDING: float = -2.0;
+        /// Width of a blurred environment map, texels.
+        BLURRED_WIDTH: uint = 192;
+        /// Height of a blurred environment map, texels.
+        BLURRED_HEIGHT: uint = 96;
     };
 
     /// An environment map in equirectangular projection.
@@ -29,10 +33,9 @@ records! {
         width: uint,
         /// Height in texels.
         height: uint,
-        /// Padding to a multiple of 16 bytes.
-        reserved0: uint,
-        /// Padding to a multiple of 16 bytes.
-        reserved1: uint,
+        /// A `vec4` per texel of `BLURRED_WIDTH` x `BLURRED_HEIGHT`: the map blurred, with
+        /// `WITH_BLURRED_BACKGROUND`.
+        blurred: address,
         /// World to map, three rows; in the map's space +y is up and -z is at its centre.
         to_map: vec4[3],
     }
@@ -143,8 +146,10 @@ records! {
         few_count: uint,
         /// Address of those leaves, then of their boxes of eight floats (shaders/trace/few.glsl).
         few: address,
+        /// The material of a ground that catches shadows, with `WITH_CATCHER`.
+        catcher: uint,
         /// Padding to a multiple of 16 bytes.
-        reserved: address,
+        reserved: uint,
     }
 
     /// Parameters of the paths of a frame in real time, with `WITH_SIGNAL`. They lie behind the

@@ -86,6 +86,7 @@ impl Renderer {
     /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that does not exist.
     pub fn interactive(&mut self, lighting: &LightingSettings, animation: Option<usize>) -> Result<Interactive<'_>> {
         self.light_or_choose(lighting)?;
+        self.lay_ground();
         // views build their own, and memory may not hold both
         self.tracer = None;
         let animation = match animation {

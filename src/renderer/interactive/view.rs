@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::{Interactive, TracedScene};
 use crate::accel::features::Blend;
+use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::camera::CameraRecord;
@@ -18,7 +19,7 @@ use crate::film::{Control, Film, SampleSettings};
 use crate::gpu::Timing;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::{Integrator, RenderJob};
-use crate::output::{self, Channel, FileSettings, Image, Picture, png};
+use crate::output::{self, Channel, FileSettings, Image, Picture, picture, png};
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::renderer::frames::{
@@ -37,6 +38,9 @@ use crate::tracer::MovedBounds;
 const CPU_LAUNCH_RAYS: u32 = 1 << 17;
 /// Samples per pixel at which a still counts as finished.
 const MAX_SPP: u32 = 1 << 20;
+/// Side of the squares behind a transparent image, pixels, and their greys, sRGB.
+const CHECKER: usize = 12;
+const CHECKERS: [u8; 2] = [96, 128];
 
 /// An image of the scene in progress.
 pub struct View {
@@ -307,23 +311,31 @@ impl View {
             return Ok(None);
         }
         let [width, height] = self.size;
-        let rgba = match &self.kind {
-            Kind::Frames(view) => match view.realtime.displayed() {
-                Some(buffer) => buffer.read(0, 4 * u64::from(width) * u64::from(height))?,
-                None => return Ok(None),
-            },
+        let background = self.settings.backdrop().of_pictures();
+        let picture = match &self.kind {
+            Kind::Frames(view) => {
+                let Some(buffer) = view.realtime.displayed() else { return Ok(None) };
+                let rgba = buffer.read(0, 4 * u64::from(width) * u64::from(height))?;
+                let Some(background) = background else { return Ok(Some(ViewPicture { size: self.size, rgba })) };
+                let rgb = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+                Picture::of_bytes(rgb, self.size, png::Colour::Rgb)?.on(background, &view.realtime.coverage()?)?
+            }
             Kind::Still(view) if view.state.is_none() => return Ok(None),
             Kind::Still(view) => {
-                let image = view.image(self.size);
-                let shown = view.integrator.picture(&image, &self.settings.picture.options());
-                let (bytes, colour) = png::bytes_of(&shown, 0.0, Path::new("view"))?;
-                match colour {
-                    png::Colour::Grey => bytes.iter().flat_map(|&g| [g, g, g, 255]).collect(),
-                    _ => bytes.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
+                let (image, options) = (view.image(self.size), self.settings.picture.options());
+                if background.is_none() {
+                    let shown = view.integrator.picture(&image, &options);
+                    let (bytes, colour) = png::bytes_of(&shown, 0.0, Path::new("view"))?;
+                    Picture::of_bytes(bytes, self.size, colour)?
+                } else {
+                    let mut shown = view.integrator.picture(&picture::unassociated(&image), &options);
+                    shown.channels.retain(|c| c.name != "A");
+                    shown.channels.extend(image.channels.into_iter().filter(|c| c.name == "A"));
+                    Picture::new(&shown, background, &FileSettings::default(), Path::new("view"))?
                 }
             }
         };
-        Ok(Some(ViewPicture { size: self.size, rgba }))
+        Ok(Some(ViewPicture { size: self.size, rgba: opaque(&picture) }))
     }
 
     /// The values of the image after the last step.
@@ -396,6 +408,29 @@ impl View {
         }
         Ok(image)
     }
+}
+
+/// The picture as RGBA with alpha 255; what it leaves open shows a checkerboard.
+fn opaque(picture: &Picture) -> Vec<u8> {
+    let (channels, width) = (picture.colour.channels(), picture.width as usize);
+    let pixel = |(k, p): (usize, &[u8])| {
+        let (rgb, alpha) = match *p {
+            [grey] => ([grey; 3], 255),
+            [grey, alpha] => ([grey; 3], alpha),
+            [r, g, b] => ([r, g, b], 255),
+            [r, g, b, alpha, ..] => ([r, g, b], alpha),
+            [] => ([0; 3], 255),
+        };
+        let is_light = (k % width / CHECKER + k / width / CHECKER).is_multiple_of(2);
+        let behind = srgb_decode(f32::from(CHECKERS[usize::from(is_light)]) / 255.0);
+        let share = f32::from(alpha) / 255.0;
+        let over = |c: u8| match alpha {
+            255 => c,
+            _ => srgb_byte(srgb_decode(f32::from(c) / 255.0) * share + behind * (1.0 - share)),
+        };
+        [over(rgb[0]), over(rgb[1]), over(rgb[2]), 255]
+    };
+    picture.bytes.chunks_exact(channels).enumerate().flat_map(pixel).collect()
 }
 
 impl FramesView {

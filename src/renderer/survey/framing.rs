@@ -306,9 +306,9 @@ fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
         Geometry::Triangles(t) => t.positions.len() as u64,
         Geometry::Spheres(s) => s.len() as u64,
     };
-    let exact = scene.instances.iter().map(count).sum::<u64>() <= MAX_POINTS;
-    scene
-        .instances
+    let standing = scene.standing();
+    let exact = standing.iter().map(count).sum::<u64>() <= MAX_POINTS;
+    standing
         .par_iter()
         .flat_map_iter(|instance| -> Vec<(DVec3, f64)> {
             let to_world = &instance.object_to_world;
@@ -351,7 +351,7 @@ fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
 
 /// Whether the scene is one closed mesh. Rooms are made of several, or of sheets that face inwards.
 fn is_body(scene: &Scene) -> bool {
-    let [instance] = &scene.instances[..] else { return false };
+    let [instance] = scene.standing() else { return false };
     match &scene.meshes[instance.mesh].geometry {
         Geometry::Triangles(mesh) => open_edges(mesh) == 0,
         Geometry::Spheres(_) => false,

@@ -5,11 +5,12 @@ use egui::{CollapsingHeader, ComboBox, Response, Ui};
 
 use super::slider::Scale;
 use super::{editor, hierarchy, menu, performance, scene, slider};
+use crate::integrators::backdrop::Backdrop;
 use crate::integrators::{Integrator, IntegratorName};
 use crate::scene::environments::BuiltinEnvironment;
 use crate::scene::load::{GeometryOptions, NormalSource, Projection, UpAxis};
 use crate::scene::settings::variant_index;
-use crate::scene::{Camera, Projection as CameraProjection};
+use crate::scene::{Camera, Ground, Projection as CameraProjection};
 use crate::settings::{Capability, Length, Level, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Arrangement, Second};
@@ -361,6 +362,8 @@ fn light(app: &mut App, ui: &mut Ui) {
     }
 
     environment(app, ui);
+    background(app, ui);
+    ground(app, ui);
     ui.separator();
 
     // how bright, and how it becomes colours
@@ -479,6 +482,74 @@ fn environment(app: &mut App, ui: &mut Ui) {
             }
         });
     });
+}
+
+/// The background of the scene, apart from what lights it.
+fn background(app: &mut App, ui: &mut Ui) {
+    let current = app.settings.image.background.unwrap_or_default();
+    let colour = match current {
+        Backdrop::Colour(colour) => colour,
+        _ => [0.2; 3],
+    };
+    let listed = [
+        (Backdrop::Map, "The environment", "As it is, or black"),
+        (Backdrop::Blurred, "Blurred", "The environment, blurred"),
+        (Backdrop::Colour(colour), "Colour", "A colour, which no tone mapping changes"),
+        (Backdrop::Transparent, "Transparent", "Nothing: saved pictures have alpha; squares are shown in its place"),
+    ];
+    let shown = listed.iter().find(|l| l.0 == current).map_or("", |l| l.1);
+    let mut chosen = current;
+    ui.horizontal(|ui| {
+        let heading =
+            ui.label("Background").on_hover_text("Light, mirrors and glass keep the environment\n--background");
+        let list = ComboBox::from_id_salt("background").selected_text(shown).show_ui(ui, |ui| {
+            for (backdrop, name, help) in listed {
+                ui.selectable_value(&mut chosen, backdrop, name).on_hover_text(help);
+            }
+        });
+        list.response.labelled_by(heading.id);
+        if let Backdrop::Colour(linear) = &mut chosen {
+            let mut rgb = egui::Rgba::from_rgb(linear[0], linear[1], linear[2]);
+            let alpha = egui::color_picker::Alpha::Opaque;
+            if egui::color_picker::color_edit_button_rgba(ui, &mut rgb, alpha).changed() {
+                *linear = [rgb.r(), rgb.g(), rgb.b()].map(|c| c.clamp(0.0, 1.0));
+            }
+        }
+    });
+    if chosen != current {
+        app.settings.image.background = Some(chosen).filter(|b| *b != Backdrop::Map);
+    }
+}
+
+/// The ground under the scene.
+fn ground(app: &mut App, ui: &mut Ui) {
+    let image = &mut app.settings.image;
+    let mut chosen = image.ground.unwrap_or_default();
+    ui.horizontal(|ui| {
+        let heading = ui.label("Ground").on_hover_text("Under the scene\n--ground");
+        let name = |ground: Ground| ["None", "Plane", "Shadow catcher"][ground as usize];
+        let list = ComboBox::from_id_salt("ground").selected_text(name(chosen)).show_ui(ui, |ui| {
+            for ground in Ground::ALL {
+                ui.selectable_value(&mut chosen, ground, name(ground)).on_hover_text(ground.help());
+            }
+        });
+        list.response.labelled_by(heading.id);
+        if let (true, Some((low, high))) = (chosen != Ground::None, app.scene.as_ref().map(|scene| scene.bounds)) {
+            let mut height = image.ground_height.unwrap_or(low.y);
+            let speed = 1e-3 * (high - low).length().max(1e-6);
+            let edit = ui.add(egui::DragValue::new(&mut height).speed(speed).prefix("y "));
+            if edit.on_hover_text("Height\n--ground-height").changed() {
+                image.ground_height = Some(height).filter(|h| *h != low.y);
+            }
+        }
+    });
+    image.ground = Some(chosen).filter(|g| *g != Ground::None);
+    if chosen == Ground::None {
+        image.ground_height = None;
+    }
+    if chosen == Ground::Catcher && !app.first.catches_shadows() {
+        ui.label("Stills show what the ground catches; frames in real time show a plane.");
+    }
 }
 
 /// The last part of a path.

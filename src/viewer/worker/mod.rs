@@ -316,6 +316,7 @@ impl Worker {
         }
         // the light may be a file that cannot be read: then there is the one before
         let (mut first, mut refused) = (first.clone(), None);
+        open.renderer.want_ground(first.ground.0, first.ground.1);
         let interactive = match open.renderer.interactive(&first.lighting, animation) {
             Ok(interactive) => {
                 self.lighting = first.lighting.clone();
@@ -451,7 +452,7 @@ impl ViewerSession<'_> {
     fn serves(&self, request: &Request) -> bool {
         // materials may be edited meanwhile
         let meaning = |r: &Request| SceneSettings { material: Vec::new(), ..r.meaning.clone() };
-        let source = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), meaning(r), r.animation);
+        let source = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), meaning(r), r.animation, r.ground);
         let is_lit = request.lighting == self.first.lighting || Some(&request.lighting) == self.refused.as_ref();
         is_lit && source(request) == source(&self.first)
     }
