@@ -30,7 +30,7 @@ const SKETCH_SIZE: [u32; 2] = [96, 54];
 const SKETCH_SPP: u32 = 8;
 /// Mean radiance of surfaces in a well exposed image.
 const MIDDLE_GREY: f64 = 0.2;
-/// Names of objects and of materials that text shows; `--json` has all.
+/// Names of objects, of nodes and of materials that text shows; `--json` has all.
 const SHOWN_NAMES: usize = 8;
 
 /// `skylit info`.
@@ -198,6 +198,9 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
     add("geometry", geometry_text(i));
     if !i.objects.is_empty() {
         add("objects", format!("{} (--hide, --only)", first_names(&i.objects)));
+    }
+    if !i.nodes.is_empty() {
+        add("nodes", format!("{} (--hide, --only: with all below)", first_names(&i.nodes)));
     }
     add("surfaces", surfaces_text(i));
     scene.report.remarks().into_iter().for_each(|remark| add("vertices", remark));

@@ -20,6 +20,9 @@ pub struct Inventory {
     pub instances: usize,
     /// Names of instances, which `--hide` and `--only` take; each once, in the file's order.
     pub objects: Vec<String>,
+    /// Names of the topmost nodes that tell parts of the scene apart, which `--hide` and `--only`
+    /// take, too; each once.
+    pub nodes: Vec<String>,
     /// Meshes, and those that deform.
     pub meshes: usize,
     /// Meshes with a skin or morph targets.
@@ -99,6 +102,7 @@ impl Inventory {
             diagonal: bounds.map_or(0.0, |(lo, hi)| (hi - lo).length()),
             instances: scene.instances.len(),
             objects: distinct(scene.instances.iter().map(|i| i.name.as_str())),
+            nodes: distinct(scene.nodes.top(scene.instances.len()).iter().map(|k| &*scene.nodes[*k].name)),
             meshes: scene.meshes.len(),
             deforming_meshes: deformations.len(),
             unique_triangles: of_mesh.iter().map(|m| m.0).sum(),

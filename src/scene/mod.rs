@@ -25,6 +25,7 @@ pub mod material;
 pub mod material_edit;
 pub mod mesh;
 pub mod motion;
+pub mod nodes;
 pub mod orbit;
 pub mod settings;
 pub mod sky;
@@ -40,6 +41,7 @@ pub use lights::LightKind;
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, MeshSource, Sphere, TriangleMesh};
 pub use motion::Motion;
+pub use nodes::NodeTree;
 pub use orbit::Orbit;
 pub use settings::SceneSettings;
 pub use texture::{Filter, TexelData, Texture, Wrap};
@@ -152,6 +154,8 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Instances of meshes. Their indices are the instance ids in hits and images.
     pub instances: Vec<Instance>,
+    /// The nodes of the file that have something below them.
+    pub nodes: NodeTree,
     /// Instances that are not there until an animation shows them, as indices into
     /// [`Scene::instances`].
     pub hidden: BTreeSet<usize>,

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::Scene;
 use super::material::{AlphaMode, Material, MaterialKind};
 use super::material_edit::{self, EditedScene, MaterialEdit};
+use super::nodes::find_instances;
 use crate::error::{Error, Result};
 use crate::settings::{AppliesTo, choices, settings};
 
@@ -48,11 +49,16 @@ settings! {
         /// emission=R,G,B (linear radiance). Textures multiply them, as they do the file's values.
         material: Vec<MaterialEdit>,
             option(value_name = "NAME|INDEX KEY=VALUE...", value_parser = material_edit::parse), applies(AppliesTo::ALL);
-        /// Leave an object (an instance of a mesh) out, by its name or its number from 0; may be
-        /// repeated
-        hide: Vec<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
-        /// Leave all objects out but this one, by its name or its number from 0; may be repeated
-        only: Vec<String>, option(value_name = "NAME|INDEX"), applies(AppliesTo::ALL);
+        /// Leave out an object, or a node with all that is below it; may be repeated
+        ///
+        /// Objects are instances of meshes: they are given by a name, a number from 0, or a range
+        /// of numbers, A..B, from A up to B without B. Nodes, such as the groups of an .obj, are
+        /// given by a name. Lights stay.
+        hide: Vec<String>, option(value_name = "NAME|INDEX|A..B"), applies(AppliesTo::ALL);
+        /// Leave out all objects but this one, or all but those below a node; may be repeated
+        ///
+        /// Names, numbers and ranges are those that --hide takes.
+        only: Vec<String>, option(value_name = "NAME|INDEX|A..B"), applies(AppliesTo::ALL);
     }
 }
 
@@ -108,8 +114,13 @@ impl SceneSettings {
         let instances = || scene.instances.iter().map(|i| i.name.as_str());
         let none = |option: &str, text: &str, what: &str, names: &mut dyn Iterator<Item = &str>, count: usize| {
             const MOST: usize = 8;
-            let names: Vec<&str> = names.filter(|name| !name.is_empty()).take(MOST).collect();
-            let named = if names.is_empty() { String::new() } else { format!(", such as {}", names.join(", ")) };
+            let mut shown: Vec<&str> = Vec::new();
+            for name in names {
+                if shown.len() < MOST && !name.is_empty() && !shown.contains(&name) {
+                    shown.push(name);
+                }
+            }
+            let named = if shown.is_empty() { String::new() } else { format!(", such as {}", shown.join(", ")) };
             Err(Error::Usage(format!("{option} {text}: the scene has no such {what}, but {count}{named}")))
         };
         for edit in &self.material {
@@ -119,12 +130,13 @@ impl SceneSettings {
         }
         let mut found = [Vec::new(), Vec::new()];
         for ((option, texts), found) in [("--hide", &self.hide), ("--only", &self.only)].into_iter().zip(&mut found) {
-            for text in texts {
-                let all = material_edit::named(instances(), text);
-                if all.is_empty() {
-                    return none(option, text, "object", &mut instances(), scene.instances.len());
+            for (text, ranges) in texts.iter().zip(find_instances(instances(), &scene.nodes, texts)) {
+                if ranges.is_empty() {
+                    let mut names = scene.nodes.iter().map(|node| &*node.name).chain(instances());
+                    let count = scene.nodes.len() + scene.instances.len();
+                    return none(option, text, "object or node", &mut names, count);
                 }
-                found.extend(all);
+                found.extend(ranges.into_iter().flatten());
             }
         }
         let [mut hidden, only] = found;

@@ -14,7 +14,9 @@ impl Scene {
         }
         let hidden = std::mem::take(&mut self.hidden);
         self.edited = None;
-        retain(&mut self.instances, |k| !hidden.contains(&k));
+        let is_kept: Vec<bool> = (0..self.instances.len()).map(|k| !hidden.contains(&k)).collect();
+        self.nodes.keep_instances(&is_kept);
+        retain(&mut self.instances, |k| is_kept[k]);
 
         // what the others use, each list by the one before
         let meshes: BTreeSet<usize> = self.instances.iter().map(|i| i.mesh).collect();

@@ -2,6 +2,7 @@
 //! `panels/` show it.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -13,16 +14,17 @@ use super::browse::Browsing;
 use super::camera::CameraControl;
 use super::dialog::{Dialog, RenderWanted, RenderedMotion};
 use super::file_kind::FileKind;
+use super::hiding::{self, HiddenObjects, NamedObjects};
 use super::hierarchy::{FoundHierarchy, HierarchyKey, HierarchyState};
 use super::layer::Layer;
 use super::options::{CPU_FRAME_RATE, ViewOptions};
 use super::remembered::{Hint, Remembered};
 use super::renders::Render;
 use super::request::{
-    Comparison, DeviceSummary, Event, Mailbox, ObjectSummary, Outline, PickPurpose, Progress, Request, SceneSummary,
-    TRUTH, Task,
+    Comparison, DeviceSummary, Event, Mailbox, Outline, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task,
 };
 use super::rounding::round_length;
+use super::scene_list::{SceneList, Selection};
 use super::technique::Technique;
 use crate::error::{Error, Result};
 use crate::integrators::IntegratorName;
@@ -187,9 +189,13 @@ pub struct App {
     pub is_paused: bool,
     /// The animation.
     pub playback: Playback,
-    /// The object that is selected: an index into the instances.
-    pub selected: Option<usize>,
-    /// Outline of the selected object, of the last view at rest.
+    /// The object or node that is selected.
+    pub selected: Option<Selection>,
+    /// The list of objects.
+    pub list: SceneList,
+    /// The objects that settings leave out, as long as they and the scene stay.
+    hidden: Option<HiddenObjects>,
+    /// Outline of what is selected, of the last view at rest.
     outline: Option<Arc<Outline>>,
     /// Primitive that was clicked on.
     pub pick: Option<Pick>,
@@ -292,6 +298,8 @@ impl App {
             is_paused: false,
             playback: Playback { animation: None, runs: false, time: 0.0, speed: 1.0, repeats: true },
             selected: None,
+            list: SceneList::default(),
+            hidden: None,
             outline: None,
             pick: None,
             hierarchy: HierarchyState::default(),
@@ -649,7 +657,11 @@ impl App {
         if !is_same_load {
             // indices and names of what was there before
             (self.pick, self.outline, self.hierarchy.ray) = (None, None, None);
-            self.selected = self.selected.filter(|k| is_same && *k < summary.objects.len());
+            let is_there = |selected: &Selection| match *selected {
+                Selection::Object(k) => k < summary.objects.len(),
+                Selection::Node(k) => k < summary.nodes.len(),
+            };
+            self.selected = self.selected.filter(|selected| is_same && is_there(selected));
         }
         if !is_same && self.scene.is_some() {
             // lengths and places of the scene before
@@ -691,6 +703,8 @@ impl App {
             *chosen = None;
         }
         self.forget_missing(&summary);
+        self.list.renew(&summary, self.scene.as_ref());
+        self.hidden = None;
         self.scene = Some(summary);
         if let Some(baked) = baked {
             self.show_baked(&baked);
@@ -712,7 +726,10 @@ impl App {
     fn picked(&mut self, purpose: PickPurpose, pick: Option<Pick>) {
         match (purpose, pick) {
             (PickPurpose::Describe, pick) => {
-                self.selected = pick.as_ref().map(|pick| pick.instance.0);
+                self.selected = pick.as_ref().map(|pick| Selection::Object(pick.instance.0));
+                if let (Some(pick), Some(scene)) = (&pick, &self.scene) {
+                    self.list.reveal(scene, pick.instance.0);
+                }
                 self.pick = pick;
             }
             (PickPurpose::Focus, Some(pick)) => {
@@ -735,17 +752,19 @@ impl App {
             names.enumerate().any(|(k, name)| name == text || text == k.to_string())
         };
         let [instances, _, materials, _] = scene.counts;
-        let is_object = |text: &str| {
-            scene.objects.len() < instances || is_there(text, &mut scene.objects.iter().map(|o| o.name.as_str()))
-        };
+        let named = NamedObjects { objects: &scene.objects, nodes: &scene.nodes };
         let is_material = |text: &str| {
             scene.materials.len() < materials || is_there(text, &mut scene.materials.iter().map(|m| m.name.as_str()))
         };
         let file = &mut self.settings.scene;
         let mut missing = Vec::new();
         for (option, texts) in [("--hide", &mut file.hide), ("--only", &mut file.only)] {
-            missing.extend(texts.iter().filter(|text| !is_object(text)).map(|text| format!("{option} {text}")));
-            texts.retain(|text| is_object(text));
+            let found = named.find(texts).into_iter().map(|found| !found.is_empty() || scene.objects.len() < instances);
+            let is_there: Vec<bool> = found.collect();
+            let lost = texts.iter().zip(&is_there).filter(|(_, is_there)| !**is_there);
+            missing.extend(lost.map(|(text, _)| format!("{option} {text}")));
+            let mut each = is_there.iter();
+            texts.retain(|_| each.next().copied().unwrap_or(true));
         }
         let edits = file.material.iter().map(|edit| edit.material.as_str());
         missing.extend(edits.filter(|text| !is_material(text)).map(|text| format!("--material {text}")));
@@ -753,17 +772,23 @@ impl App {
         missing.into_iter().for_each(|text| self.report(format!("{text}: the scene does not have it"), true));
     }
 
-    /// Selects an object, or nothing. What was clicked on is forgotten.
-    pub fn select(&mut self, object: Option<usize>) {
-        (self.selected, self.pick) = (object, None);
+    /// Selects an object, a node, or nothing. What was clicked on is forgotten.
+    pub fn select(&mut self, selected: Option<Selection>) {
+        (self.selected, self.pick) = (selected, None);
+    }
+
+    /// The objects of a selection, indices.
+    fn objects_of(&self, selection: Selection) -> Range<usize> {
+        self.scene.as_ref().map_or(0..0, |scene| selection.objects(&scene.nodes))
     }
 
     /// The outline of what is selected, if it is that of what is shown.
     pub fn outline(&self) -> Option<&Outline> {
         let outline = self.outline.as_deref()?;
         let shown = self.panes[0].progress.as_ref().and_then(|p| p.camera.as_ref());
-        let is_shown = (Some(outline.object), outline.time, outline.size)
-            == (self.selected, self.playback.time, self.size)
+        let selected = self.selected.map(|selected| self.objects_of(selected));
+        let is_shown = (Some(&outline.objects), outline.time, outline.size)
+            == (selected.as_ref(), self.playback.time, self.size)
             && shown == Some(&outline.camera);
         is_shown.then_some(outline)
     }
@@ -780,43 +805,48 @@ impl App {
         self.hierarchy.ray = self.shown_camera().map(|camera| camera_ray(&camera, at, aspect));
     }
 
-    /// How settings name an object: by its name, unless others have it.
-    fn object_name(&self, object: usize) -> String {
-        let objects = self.scene.as_ref().map(|s| s.objects.as_slice()).unwrap_or_default();
-        let name = objects.get(object).map_or("", |o| o.name.as_str());
-        key(objects.iter().map(|o| o.name.as_str()), object, name)
-    }
-
-    /// Whether each object is left out.
-    pub fn hidden_objects(&self) -> Vec<bool> {
-        let objects = self.scene.as_ref().map(|s| s.objects.as_slice()).unwrap_or_default();
+    /// Number of objects before each that are left out, and of all, last.
+    pub fn hidden_before(&mut self) -> Arc<Vec<u32>> {
         let file = &self.settings.scene;
-        let is_in = |texts: &[String], k: usize, name: &str| texts.iter().any(|t| t == name || *t == k.to_string());
-        let is_hidden = |(k, o): (usize, &ObjectSummary)| {
-            is_in(&file.hide, k, &o.name) || !file.only.is_empty() && !is_in(&file.only, k, &o.name)
-        };
-        objects.iter().enumerate().map(is_hidden).collect()
+        if let Some(hidden) = self.hidden.as_ref().filter(|hidden| hidden.is_by(file)) {
+            return hidden.before.clone();
+        }
+        let scene = self.scene.as_ref().map(|s| NamedObjects { objects: &s.objects, nodes: &s.nodes });
+        let before = Arc::new(scene.map_or_else(|| vec![0], |scene| scene.hidden_before(file)));
+        self.hidden = Some(HiddenObjects::new(file, before.clone()));
+        before
     }
 
-    /// Leaves an object out, or not any more.
-    pub fn hide(&mut self, object: usize, hides: bool) {
-        let name = self.object_name(object);
-        let file = &mut self.settings.scene;
-        let is_named = |text: &String| *text == name || *text == object.to_string();
-        file.hide.retain(|text| !is_named(text));
-        match (hides, file.only.is_empty()) {
-            (true, true) => file.hide.push(name),
-            (true, false) if file.only.iter().all(is_named) => file.hide.push(name),
-            (true, false) => file.only.retain(|text| !is_named(text)),
-            (false, false) if !file.only.iter().any(is_named) => file.only.push(name),
-            (false, _) => {}
+    /// Number of objects of a selection, and of those that are left out.
+    pub fn hidden_count(&mut self, selection: Selection) -> [usize; 2] {
+        let (range, before) = (self.objects_of(selection), self.hidden_before());
+        let last = before.len() - 1;
+        let [start, end] = [range.start, range.end].map(|k| before[k.min(last)] as usize);
+        [range.len(), end - start]
+    }
+
+    /// Whether all objects of a selection are left out.
+    pub fn is_hidden(&mut self, selection: Selection) -> bool {
+        let [all, hidden] = self.hidden_count(selection);
+        hidden == all
+    }
+
+    /// Leaves an object or all below a node out, or not any more.
+    pub fn hide(&mut self, selection: Selection, hides: bool) {
+        let range = self.objects_of(selection);
+        if let Some(scene) = self.scene.as_ref().filter(|_| !range.is_empty()) {
+            let scene = NamedObjects { objects: &scene.objects, nodes: &scene.nodes };
+            hiding::set_hidden(&mut self.settings.scene, scene, &range, hides);
         }
     }
 
-    /// Shows an object alone.
-    pub fn isolate(&mut self, object: usize) {
-        let name = self.object_name(object);
-        (self.settings.scene.hide, self.settings.scene.only) = (Vec::new(), vec![name]);
+    /// Shows an object or what is below a node alone.
+    pub fn isolate(&mut self, selection: Selection) {
+        let range = self.objects_of(selection);
+        if let Some(scene) = self.scene.as_ref().filter(|_| !range.is_empty()) {
+            let text = NamedObjects { objects: &scene.objects, nodes: &scene.nodes }.text(&range);
+            (self.settings.scene.hide, self.settings.scene.only) = (Vec::new(), vec![text]);
+        }
     }
 
     /// Leaves no object out.
@@ -824,11 +854,12 @@ impl App {
         (self.settings.scene.hide, self.settings.scene.only) = (Vec::new(), Vec::new());
     }
 
-    /// Looks at an object from where the camera is.
-    pub fn frame_object(&mut self, object: usize) {
-        let bounds = self.scene.as_ref().and_then(|s| s.objects.get(object)?.bounds);
+    /// Looks at an object or a node from where the camera is.
+    pub fn frame(&mut self, selection: Selection) {
+        let objects = self.scene.as_ref().and_then(|s| s.objects.get(self.objects_of(selection)));
+        let bounds = objects.into_iter().flatten().filter_map(|o| o.bounds);
         let aspect = f64::from(self.size[0].max(1)) / f64::from(self.size[1].max(1));
-        let Some(bounds) = bounds else { return };
+        let Some(bounds) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { return };
         self.leave_followed();
         self.control.iter_mut().for_each(|control| control.frame(bounds, aspect));
     }
@@ -1022,7 +1053,7 @@ impl App {
             camera: self.control.as_ref().map(|c| c.camera().clone()),
             first_camera: self.settings.camera.clone(),
             followed_camera: self.followed,
-            selected: self.selected,
+            selected: self.selected.map(|selected| self.objects_of(selected)).filter(|objects| !objects.is_empty()),
             hierarchy: self.hierarchy.is_shown(),
             shown,
             panes,
@@ -1484,10 +1515,8 @@ impl App {
 /// How settings name one of several: by its name, unless it has none, others have it, it is a
 /// number, or it could be taken for a value; else by its number.
 fn key<'a>(names: impl Iterator<Item = &'a str>, index: usize, name: &str) -> String {
-    let is_plain = !name.is_empty() && !name.contains('=') && !name.starts_with('-') && name.parse::<usize>().is_err();
-    let is_one_line = name.split(' ').all(|word| !word.is_empty() && !word.contains(char::is_whitespace));
     let is_unique = || names.filter(|other| *other == name).take(2).count() == 1;
-    if is_plain && is_one_line && is_unique() { name.to_owned() } else { index.to_string() }
+    if hiding::is_plain(name) && is_unique() { name.to_owned() } else { index.to_string() }
 }
 
 /// Figures of the last frames.

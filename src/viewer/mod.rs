@@ -15,6 +15,7 @@ pub mod dialog;
 mod file_kind;
 #[cfg(feature = "probes")]
 pub mod headless;
+mod hiding;
 pub mod hierarchy;
 pub mod images;
 pub mod layer;
@@ -26,6 +27,7 @@ pub mod remembered;
 pub mod renders;
 pub mod request;
 mod rounding;
+pub mod scene_list;
 #[cfg(feature = "probes")]
 pub mod script;
 pub mod technique;

@@ -1,6 +1,7 @@
 //! Messages between the window and the thread that renders: requests, of which the latest counts,
 //! and events.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -15,7 +16,7 @@ use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
 use crate::scene::load::GeometryOptions;
-use crate::scene::{Camera, Ground, Material, SceneSettings};
+use crate::scene::{Camera, Ground, Material, NodeTree, SceneSettings};
 use crate::tracer::DeviceSettings;
 
 /// Index of an image: the first, the second or the truth ([`TRUTH`]).
@@ -53,8 +54,8 @@ pub struct Request {
     pub first_camera: CameraSettings,
     /// Index of the file's camera that the animation moves, if the view follows it.
     pub followed_camera: Option<usize>,
-    /// The instance whose outline is wanted, an index.
-    pub selected: Option<usize>,
+    /// The instances whose outline is wanted, indices.
+    pub selected: Option<Range<usize>>,
     /// Hierarchy and influence areas are wanted.
     pub hierarchy: bool,
     /// Images to render: those on the screen, then the truth.
@@ -202,6 +203,10 @@ pub struct SceneSummary {
     pub textures: Vec<String>,
     /// Instances of the scene, by index.
     pub objects: Arc<Vec<ObjectSummary>>,
+    /// The nodes that they are below.
+    pub nodes: Arc<NodeTree>,
+    /// Names of lights, or their kinds.
+    pub lights: Vec<String>,
     /// Materials of the scene as they are without edits, by index.
     pub materials: Arc<Vec<Material>>,
     /// Number of triangles and spheres over all instances.
@@ -218,7 +223,7 @@ pub struct ObjectSummary {
     /// Name of its node; may be empty.
     pub name: String,
     /// Index of its mesh, and the mesh's name.
-    pub mesh: (usize, String),
+    pub mesh: (usize, Arc<str>),
     /// Index of its material.
     pub material: usize,
     /// Triangles or spheres.
@@ -229,11 +234,11 @@ pub struct ObjectSummary {
     pub is_hidden: bool,
 }
 
-/// Where an object ends in the image.
+/// Where objects end in the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
-    /// The instance, an index.
-    pub object: usize,
+    /// The instances, indices.
+    pub objects: Range<usize>,
     /// The camera that it is seen by.
     pub camera: Camera,
     /// Time of the animation, seconds.

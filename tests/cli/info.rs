@@ -27,6 +27,17 @@ fn files_are_described_without_a_device() {
         assert!(text.contains(name), "{name}: {text}");
     }
     assert!(text.contains(" (--hide, --only)") && text.contains(" (--material)"), "{text}");
+    // groups of a file are named, and leave out what is below them
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    let runs = ["o car\ng wheel", "g door", "o house\ng door", "g roof"].map(|s| format!("{s}\nf 1 2 3\n"));
+    std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", runs.concat())).unwrap();
+    let path = path.to_str().unwrap();
+    let text = String::from_utf8(run(&["info", path, "--no-device", "--hide", "car"]).stdout).unwrap();
+    assert!(text.contains("nodes       car, house (--hide, --only: with all below)"), "{text}");
+    let record = json(&run(&["info", path, "--no-device", "--json"]));
+    assert_eq!(record["inventory"]["nodes"], serde_json::json!(["car", "house"]));
+    refuses(&["info", path, "--hide", "boat"], 64, "--hide boat: the scene has no such object or node");
     refuses(&["info", "nowhere.glb"], 3, "nowhere.glb");
     refuses(&["info", "builtin:nothing"], 64, "no built-in scene");
 }

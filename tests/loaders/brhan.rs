@@ -58,6 +58,9 @@ fn everything() {
     // a light is a sphere that emits, and counted once
     assert_eq!((spheres(4).radius, material(4).emissive), (2.0, Vec3::new(10.0, 5.0, 1.0)));
     assert!(scene.lights.is_empty());
+    // each model is a node
+    let nodes: Vec<_> = scene.nodes.iter().map(|node| (&*node.name, node.instances())).collect();
+    assert_eq!(nodes, [("m.obj", 0..1), ("m.obj", 1..2), ("m.obj", 2..3)]);
     assert_eq!((scene.triangle_count(), scene.sphere_count()), (3, 2));
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::{DAffine3, DVec3, Vec3};
 use serde_json::json;
 use skylit::scene::animation::{Playback, Pose};
-use skylit::scene::{LightKind, Projection, Scene};
+use skylit::scene::{LightKind, Projection, Scene, SceneSettings};
 
 use crate::build::*;
 
@@ -71,6 +71,88 @@ fn which_scene() {
     assert_eq!(names(&doc), "a");
     doc.json.as_object_mut().unwrap().remove("scenes");
     assert_eq!(names(&doc), "abc");
+}
+
+/// Name of a node, index of the node above it, and ranges of instances, cameras and lights.
+type NodeContent<'a> = (&'a str, Option<usize>, [std::ops::Range<usize>; 3]);
+
+/// Content of all nodes.
+fn nodes(scene: &Scene) -> Vec<NodeContent<'_>> {
+    scene.nodes.iter().map(|node| (&*node.name, node.parent(), node.items())).collect()
+}
+
+/// Nodes keep what is below them, whatever is dropped, and settings name them.
+#[test]
+fn nodes_have_what_is_below_them() {
+    let mut doc = Doc::triangle();
+    doc.json["extensions"] =
+        json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "name": "bulb" }, { "type": "point" }] } });
+    doc.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1 } }]);
+    let light = |k: usize| json!({ "KHR_lights_punctual": { "light": k } });
+    doc.json["nodes"] = json!([
+        { "name": "car", "children": [1, 2, 4, 5] },
+        { "name": "nothing", "mesh": 0, "scale": [0, 0, 0] },
+        { "name": "body", "mesh": 0, "children": [3] },
+        { "name": "lamp", "extensions": light(0) },
+        { "name": "driver", "camera": 0 },
+        { "children": [6, 7, 8] },
+        { "name": "spare", "extensions": light(1) },
+        { "name": "wheel", "mesh": 0 },
+        { "children": [9] },
+        { "name": "wheel", "mesh": 0 },
+        { "name": "house", "mesh": 0 },
+    ]);
+    doc.json["scenes"] = json!([{ "nodes": [0, 10] }]);
+    let mut scene = doc.load();
+    let names: Vec<&str> = scene.instances.iter().map(|i| i.name.as_str()).collect();
+    assert_eq!(names, ["body", "wheel", "wheel", "house"]);
+    assert_eq!(
+        nodes(&scene),
+        [
+            ("car", None, [0..3, 0..1, 0..2]),
+            ("body", Some(0), [0..1, 0..0, 0..1]),
+            ("lamp", Some(1), [1..1, 0..0, 0..1]),
+            ("", Some(0), [1..3, 1..1, 1..2]),
+        ]
+    );
+
+    let texts = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+    for (hide, only, hidden) in [
+        (&["car"][..], &[][..], &[0, 1, 2][..]),
+        (&["body"], &[], &[0]),
+        (&["wheel"], &[], &[1, 2]),
+        (&["2..4", "0"], &[], &[0, 2, 3]),
+        (&["body"], &["car"], &[0, 3]),
+    ] {
+        let settings = SceneSettings { hide: texts(hide), only: texts(only), ..Default::default() };
+        assert!(settings.apply(&mut scene).unwrap());
+        assert!(scene.hidden.iter().eq(hidden), "{hide:?} {only:?}: {:?}", scene.hidden);
+    }
+    for text in ["lamp", "4", "3..5"] {
+        let settings = SceneSettings { hide: texts(&[text]), ..Default::default() };
+        let error = settings.apply(&mut scene).unwrap_err().to_string();
+        assert!(error.contains(text) && error.contains("no such object or node, but 8, such as car, body"), "{error}");
+    }
+    // what is taken out takes nodes without anything with it
+    let settings = SceneSettings { only: texts(&["house", "1"]), ..Default::default() };
+    settings.apply(&mut scene).unwrap();
+    scene.take_out_hidden();
+    assert_eq!(nodes(&scene)[0], ("car", None, [0..1, 0..1, 0..2]));
+}
+
+/// A node with several primitives is above them; a node without anything else is its own instance.
+#[test]
+fn primitives_are_below_their_node() {
+    let mut doc = Doc::triangle();
+    assert!(doc.load().nodes.is_empty());
+    let primitive = doc.first().clone();
+    doc.primitive(primitive);
+    assert_eq!(nodes(&doc.load()), [("node", None, [0..2, 0..0, 0..0])]);
+    // deep files are no deep calls
+    let chain = |k: usize| if k < 100_000 { json!({ "name": "n", "children": [k + 1] }) } else { json!({ "mesh": 0 }) };
+    doc.json["nodes"] = (0..=100_000).map(chain).collect();
+    let scene = doc.load();
+    assert_eq!((scene.nodes.len(), scene.nodes.above(1).len(), scene.nodes.top(2)), (100_001, 100_001, vec![100_000]));
 }
 
 #[test]

@@ -840,3 +840,27 @@ fn projected_texture_coordinates() {
     let scene = load_vertices(&folder.write("b.obj", text), "file", Some(Spherical));
     assert_eq!((mesh(&scene, 0).texcoords[0][0], scene.report.texcoords_projected), (Vec2::splat(0.5), 0));
 }
+
+/// Objects are above their groups, and groups above their runs of one material.
+#[test]
+fn objects_and_groups_are_nodes() {
+    let folder = Folder::new();
+    let run = |statements: &str| format!("{statements}\nf 1 2 3\n");
+    let text = [
+        "g ground",
+        "o car",
+        "g wheel",
+        "usemtl rubber",
+        "g door",
+        "o house\ng door",
+        "usemtl wood",
+        "o house\ng roof",
+    ];
+    let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", text.map(run).concat());
+    let scene = folder.load("a.obj", text).unwrap();
+    let names: Vec<&str> = scene.instances.iter().map(|i| i.name.as_str()).collect();
+    assert_eq!(names, ["ground", "car", "wheel", "wheel", "door", "door", "door", "roof"]);
+    let nodes: Vec<_> = scene.nodes.iter().map(|node| (&*node.name, node.parent(), node.instances())).collect();
+    let expected = [("car", None, 1..5), ("wheel", Some(0), 2..4), ("house", None, 5..8), ("door", Some(2), 5..7)];
+    assert_eq!(nodes, expected);
+}

@@ -17,6 +17,7 @@ use skylit::viewer::request::{
     Comparison, DeviceSummary, Event, EventSender, Mailbox, ObjectSummary, Outline, PickPurpose, Progress,
     SceneSummary, TRUTH, Task,
 };
+use skylit::viewer::scene_list::Selection;
 use skylit::viewer::technique::Technique;
 use skylit::viewer::{FileKind, ViewOptions, panels};
 
@@ -1014,7 +1015,7 @@ fn objects_are_selected_hidden_and_isolated() {
     assert!(alone.harness.query_by_label("left").is_none());
     alone.click("⏵ chair (2)");
     alone.click("left");
-    assert_eq!(alone.mailbox.peek().selected, Some(0));
+    assert_eq!(alone.mailbox.peek().selected, Some(0..1));
 
     // without a name, or one that others have, it is a number
     alone.click("Show chair");
@@ -1072,6 +1073,125 @@ fn objects_are_selected_hidden_and_isolated() {
     assert_eq!((file(&alone), alone.mailbox.peek().selected), (Default::default(), None));
 }
 
+/// A village: a house of a roof and twelve windows, a car of wheels, a lamp and a camera, all below one node.
+fn village() -> SceneSummary {
+    use serde_json::json;
+
+    let mesh = |name: &str| json!({ "name": name, "mesh": 0 });
+    let mut nodes = vec![
+        json!({ "name": "village", "children": [1, 2] }),
+        json!({ "name": "house", "children": (9..22).collect::<Vec<_>>() }),
+        json!({ "name": "car", "children": [3, 4, 7, 8] }),
+        json!({ "name": "wheels", "children": [5, 6] }),
+        json!({ "name": "lamp", "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+        mesh("left wheel"),
+        mesh("right wheel"),
+        json!({ "name": "body", "mesh": 0, "translation": [5, 0, 0] }),
+        json!({ "name": "driver", "camera": 0 }),
+        mesh("roof"),
+    ];
+    nodes.extend((1..=12).map(|k| mesh(&format!("window {k}"))));
+    let file = json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }],
+        "nodes": nodes,
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 1 } }],
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "point" }] } },
+        "meshes": [{ "name": "mesh", "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3 }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36, "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }],
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("village.gltf");
+    std::fs::write(&path, file.to_string()).unwrap();
+    let scene = skylit::scene::load::load(path.to_str().unwrap()).unwrap();
+    let object = |i: &skylit::scene::Instance| ObjectSummary {
+        name: i.name.clone(),
+        mesh: (i.mesh, "mesh".into()),
+        bounds: Some((i.object_to_world.translation, i.object_to_world.translation + glam::DVec3::ONE)),
+        ..Default::default()
+    };
+    SceneSummary {
+        load: 1,
+        is_complete: true,
+        source: "village.gltf".into(),
+        bounds: scene.bounds().unwrap(),
+        cameras: scene.cameras.clone(),
+        lights: vec!["point".into()],
+        materials: Arc::new(scene.materials.clone()),
+        objects: Arc::new(scene.instances.iter().map(object).collect()),
+        counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],
+        nodes: Arc::new(scene.nodes),
+        ..Default::default()
+    }
+}
+
+/// Nodes of a file are a tree: it is folded, searched and scrolled, and all below a node is hidden, isolated and framed.
+#[test]
+fn nodes_are_folded_selected_hidden_and_searched() {
+    let mut alone = alone_with(Some("village.gltf"), RenderSettings::default());
+    let scene = village();
+    let camera = skylit::scene::Camera::look_at(glam::DVec3::splat(9.0), glam::DVec3::ZERO, glam::DVec3::Y, 0.8);
+    alone.events.send(Event::Loaded(Box::new(scene)));
+    alone.events.send(Event::Camera(Box::new(camera), None));
+    alone.harness.run_steps(3);
+    let file = |alone: &Alone| alone.mailbox.peek().meaning;
+    let has = |alone: &Alone, label: &str| alone.harness.query_by_label(label).is_some();
+
+    // one node above all is unfolded, what is below it is not
+    assert!(has(&alone, "Fold village (16)") && has(&alone, "house (13)") && !has(&alone, "roof"));
+    alone.click("Unfold car (3)");
+    alone.click("Unfold wheels (2)");
+    assert!(has(&alone, "left wheel") && has(&alone, "body") && has(&alone, "💡 point"));
+    alone.click("Fold wheels (2)");
+    assert!(!has(&alone, "left wheel") && has(&alone, "body"));
+
+    // all below a node, and all but one of it
+    alone.click("car (3)");
+    assert_eq!(alone.mailbox.peek().selected, Some(13..16));
+    assert!(has(&alone, "Select one object to change its material."));
+    alone.click("Hide");
+    assert_eq!(file(&alone).hide, ["car"]);
+    alone.click("Show body");
+    assert_eq!(file(&alone).hide, ["wheels"]);
+    alone.click("Show car (3)");
+    assert!(file(&alone).hide.is_empty(), "a part that is hidden comes back first");
+    alone.click("Show car (3)");
+    assert_eq!(file(&alone).hide, ["car"]);
+    alone.click("Isolate");
+    assert_eq!((file(&alone).only, file(&alone).hide), (vec!["car".to_owned()], Vec::new()));
+    alone.click("Show house (13)");
+    assert_eq!(file(&alone).only, ["car", "house"]);
+    alone.click("Show all");
+    alone.harness.key_press(egui::Key::H);
+    alone.harness.run_steps(3);
+    assert_eq!(file(&alone).hide, ["car"]);
+    alone.click("Show all");
+    alone.click("Frame");
+    let pivot = alone.harness.state().control.as_ref().unwrap().pivot();
+    assert!((pivot - glam::DVec3::new(3.0, 0.5, 0.5)).length() < 1e-9, "{pivot}");
+
+    // a camera is looked through
+    alone.click("📷 driver");
+    assert_eq!(alone.mailbox.peek().followed_camera, Some(0));
+
+    // what is clicked on in the image is unfolded, and scrolled to
+    let pick = Pick { instance: (12, "window 12".into()), ..a_pick() };
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(pick))));
+    alone.harness.run_steps(4);
+    assert!(has(&alone, "window 12") && !has(&alone, "roof"), "what is above it is out of view");
+
+    // a search keeps what is above its hits
+    let (role, label) = (egui::accesskit::Role::TextInput, "Search");
+    alone.harness.get_by_role_and_label(role, label).focus();
+    alone.harness.run_steps(2);
+    alone.harness.get_by_role_and_label(role, label).type_text("right");
+    alone.harness.run_steps(4);
+    assert!(has(&alone, "right wheel") && has(&alone, "wheels (2)") && has(&alone, "village (16)"));
+    assert!(!has(&alone, "left wheel") && !has(&alone, "window 12") && !has(&alone, "house (13)"));
+}
+
 /// The outline of what is selected is shown as long as it is of the view on the screen.
 #[test]
 fn outlines_are_of_what_is_shown() {
@@ -1079,12 +1199,12 @@ fn outlines_are_of_what_is_shown() {
     alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(a_pick()))));
     alone.harness.run_steps(2);
     let request = alone.mailbox.peek();
-    assert_eq!(request.selected, Some(0));
+    assert_eq!(request.selected, Some(0..1));
     let camera = request.camera.unwrap();
     let progress = |camera: &skylit::scene::Camera| Progress { camera: Some(camera.clone()), ..Default::default() };
     alone.events.send(Event::Picture(Box::new(progress(&camera))));
     let lines = vec![vec![[0.1, 0.1], [0.2, 0.1]]];
-    let outline = Outline { object: 0, camera: camera.clone(), time: 0.0, size: request.size, lines };
+    let outline = Outline { objects: 0..1, camera: camera.clone(), time: 0.0, size: request.size, lines };
     alone.events.send(Event::Outline(Arc::new(outline)));
     alone.harness.run_steps(2);
     assert!(alone.harness.state().outline().is_some());
@@ -1095,7 +1215,7 @@ fn outlines_are_of_what_is_shown() {
     assert!(alone.harness.state().outline().is_none(), "of another camera");
     alone.events.send(Event::Picture(Box::new(progress(&camera))));
     alone.harness.run_steps(2);
-    alone.change(|app| app.select(Some(1)));
+    alone.change(|app| app.select(Some(Selection::Object(1))));
     assert!(alone.harness.state().outline().is_none(), "of another object");
     alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(None)));
     alone.harness.run_steps(2);

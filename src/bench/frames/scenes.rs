@@ -99,6 +99,8 @@ pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
     if known.is_some_and(|k| k.path == SPONZA.path) && !args.is_occlusion() {
         let Scene { instances, meshes, materials, .. } = &mut scene;
         instances.retain(|i| materials[meshes[i.mesh].material].name != COVER);
+        // whose numbers are those of before
+        scene.nodes = Default::default();
     }
     if known.is_some_and(|k| k.on_plane) {
         add_plane(&mut scene, (lo, hi));

@@ -292,6 +292,7 @@ fn retain_instances(scene: &mut Scene, keep: &[bool]) {
     let mut each = keep.iter();
     scene.report.instance_nodes.retain(|_| each.next().copied().unwrap_or(true));
     let number = renumbered(keep);
+    scene.nodes.keep_instances(keep);
     scene.hidden = scene.hidden.iter().filter(|i| keep[**i]).map(|i| number[*i]).collect();
     if let Some(rig) = &mut scene.rig {
         rig.keep_instances(keep);

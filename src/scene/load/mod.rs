@@ -14,6 +14,7 @@ mod gltf;
 #[cfg(feature = "ktx2")]
 mod ktx2;
 mod model;
+mod nodes;
 mod normals;
 mod obj;
 mod options;

@@ -1,7 +1,5 @@
 //! The section about the scene: its objects, what is selected, and the values of its material.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use egui::{Button, CollapsingHeader, ScrollArea, Ui};
 use glam::Vec3;
 
@@ -11,93 +9,88 @@ use crate::scene::material_edit::MaterialEdit;
 use crate::settings::Capability;
 use crate::viewer::app::App;
 use crate::viewer::dialog::Dialog;
-use crate::viewer::request::ObjectSummary;
+use crate::viewer::scene_list::{Row, RowKind, Selection};
 
-/// Number of objects from which they can be searched.
+/// Number of lines from which they can be searched.
 const MANY: usize = 12;
 /// Height of the list, points.
 const LIST_HEIGHT: f32 = 170.0;
+/// Height of a tree, points.
+const TREE_HEIGHT: f32 = 230.0;
+/// Width of a level of a tree, points, and most levels that are told apart.
+const LEVEL_WIDTH: f32 = 12.0;
+const MAX_LEVELS: u32 = 8;
+/// Width of the arrow of a node, points.
+const ARROW_WIDTH: f32 = 16.0;
 /// Brightest emission of the slider, linear radiance.
 const BRIGHTEST: f32 = 100.0;
 
-/// A line of the list.
-enum Row {
-    /// A mesh that several objects have: its index, whether they are listed below.
-    Mesh(usize, bool),
-    /// An object, and whether it is below its mesh.
-    Object(usize, bool),
-}
-
-/// Lists the objects by their meshes, with what can be done with them.
+/// Lists the objects by the nodes of the file or by their meshes, with what can be done with them.
 pub fn objects(app: &mut App, ui: &mut Ui) {
     let Some(scene) = app.scene.as_ref() else {
         ui.label("No scene is open.");
         return;
     };
-    let objects = scene.objects.clone();
     let [instances, ..] = scene.counts;
-    if objects.is_empty() {
+    let (listed, is_tree) = (scene.objects.len(), !scene.nodes.is_empty());
+    if listed == 0 {
         return;
     }
 
     // a search, where there are many
-    let id = ui.make_persistent_id("objects");
-    let (mut search, mut open): (String, BTreeSet<usize>) = ui.data_mut(|d| d.get_temp(id)).unwrap_or_default();
-    if objects.len() > MANY {
+    if listed + scene.nodes.len() > MANY {
+        let mut search = app.list.search().to_owned();
         ui.horizontal(|ui| {
             let heading = ui.label("Search");
             ui.add(egui::TextEdit::singleline(&mut search).desired_width(160.0)).labelled_by(heading.id);
         });
+        app.list.set_search(search);
     }
-    let rows = rows(&objects, &search, &open);
 
     // the list, of which only what is in view is made
-    let hidden = app.hidden_objects();
+    let wanted = app.list.take_wanted(scene);
+    let rows = app.list.rows(scene);
     let height = ui.spacing().interact_size.y;
-    ScrollArea::vertical().id_salt("objects").max_height(LIST_HEIGHT).auto_shrink([false, true]).show_rows(
-        ui,
-        height,
-        rows.len(),
-        |ui, range| {
-            for row in &rows[range] {
-                match *row {
-                    Row::Mesh(mesh, is_open) => {
-                        let count = objects.iter().filter(|o| o.mesh.0 == mesh).count();
-                        let name = objects.iter().find(|o| o.mesh.0 == mesh).map_or("", |o| o.mesh.1.as_str());
-                        let arrow = if is_open { "⏷" } else { "⏵" };
-                        let text = format!("{arrow} {} ({count})", named("mesh", mesh, name));
-                        if ui.add(Button::selectable(false, text).truncate()).clicked() && !open.remove(&mesh) {
-                            open.insert(mesh);
-                        }
-                    }
-                    Row::Object(k, is_below) => object(app, ui, k, &objects[k], hidden[k], is_below),
-                }
-            }
-        },
-    );
-    ui.data_mut(|d| d.insert_temp(id, (search, open)));
-    if objects.len() < instances {
-        ui.weak(format!("The first {} of {instances} objects", objects.len()));
+    let most = if is_tree { TREE_HEIGHT } else { LIST_HEIGHT };
+    let mut list = ScrollArea::vertical().id_salt("objects").max_height(most).auto_shrink([false, true]);
+    if let Some(wanted) = wanted {
+        // in the middle, unless it is in view
+        let step = height + ui.spacing().item_spacing.y;
+        let place = wanted as f32 * step;
+        if place < app.list.offset || place + step > app.list.offset + most {
+            list = list.vertical_scroll_offset((place - 0.5 * (most - step)).max(0.0));
+        }
     }
-
-    // what is done with the one that is selected
+    let shown = list.show_rows(ui, height, rows.len(), |ui, range| {
+        rows.get(range).into_iter().flatten().for_each(|row| show_row(app, ui, row, is_tree));
+    });
+    app.list.offset = shown.state.offset.y;
+    if listed < instances {
+        ui.weak(format!("The first {listed} of {instances} objects"));
+    }
     ui.add_space(4.0);
-    let selected = app.selected.filter(|k| *k < objects.len());
+    actions(app, ui);
+}
+
+/// Buttons about what is selected.
+fn actions(app: &mut App, ui: &mut Ui) {
+    let selected = app.selected.filter(|selected| app.hidden_count(*selected)[0] > 0);
     ui.horizontal_wrapped(|ui| {
-        ui.add_enabled_ui(selected.is_some(), |ui| {
-            let k = selected.unwrap_or_default();
-            if ui.button("Frame").on_hover_text("Look at what is selected").clicked() {
-                app.frame_object(k);
-            }
-            if ui.button("Isolate").on_hover_text("Show what is selected alone\n--only").clicked() {
-                app.isolate(k);
-            }
-            let is_hidden = selected.is_some_and(|k| hidden[k]);
-            let text = if is_hidden { "Show again" } else { "Hide" };
-            if ui.button(text).on_hover_text("Take it out of the scene and back\n--hide").clicked() {
-                app.hide(k, !is_hidden);
-            }
-        });
+        let is_hidden = selected.is_some_and(|selected| app.is_hidden(selected));
+        let button = |ui: &mut Ui, text: &str, help: &str| {
+            let button = ui.add_enabled(selected.is_some(), Button::new(text)).on_hover_text(help);
+            selected.filter(|_| button.clicked())
+        };
+        if let Some(selected) = button(ui, "Frame", "Look at what is selected") {
+            app.frame(selected);
+        }
+        if let Some(selected) = button(ui, "Isolate", "Show what is selected alone\n--only") {
+            app.isolate(selected);
+        }
+        let text = if is_hidden { "Show again" } else { "Hide" };
+        if let Some(selected) = button(ui, text, "Take it out of the scene and back\n--hide") {
+            app.hide(selected, !is_hidden);
+        }
         let edited = &app.settings.scene;
         let is_changed = !edited.hide.is_empty() || !edited.only.is_empty();
         if ui.add_enabled(is_changed, Button::new("Show all")).clicked() {
@@ -111,68 +104,117 @@ pub fn named(kind: &str, index: usize, name: &str) -> String {
     if name.is_empty() { format!("{kind} {index}") } else { name.to_owned() }
 }
 
-/// The lines of the list: meshes of one object are that object.
-fn rows(objects: &[ObjectSummary], search: &str, open: &BTreeSet<usize>) -> Vec<Row> {
-    let search = search.trim().to_lowercase();
-    if !search.is_empty() {
-        let has = |text: &str| text.to_lowercase().contains(&search);
-        let found = objects.iter().enumerate().filter(|(_, o)| has(&o.name) || has(&o.mesh.1));
-        return found.map(|(k, _)| Row::Object(k, false)).collect();
-    }
+/// A line of the list: an arrow, whether it is shown, and a name.
+fn show_row(app: &mut App, ui: &mut Ui, row: &Row, is_tree: bool) {
+    let Some(scene) = app.scene.as_ref() else { return };
+    let level = LEVEL_WIDTH * row.level.min(MAX_LEVELS) as f32;
+    let indent = |ui: &mut Ui| ui.add_space(level + if is_tree { ARROW_WIDTH } else { 0.0 });
+    let arrow = if row.is_open { "⏷" } else { "⏵" };
 
-    // in the order in which the file first has them
-    let mut of_mesh: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (k, object) in objects.iter().enumerate() {
-        of_mesh.entry(object.mesh.0).or_default().push(k);
-    }
-    let mut rows = Vec::new();
-    for (k, object) in objects.iter().enumerate() {
-        let all = &of_mesh[&object.mesh.0];
-        match all[..] {
-            [_] => rows.push(Row::Object(k, false)),
-            [first, ..] if first == k => {
-                let is_open = open.contains(&object.mesh.0);
-                rows.push(Row::Mesh(object.mesh.0, is_open));
-                rows.extend(all.iter().filter(|_| is_open).map(|k| Row::Object(*k, true)));
+    // lines that have others below, and those that have none
+    match row.kind {
+        RowKind::Mesh(mesh, count) => {
+            let name = scene.objects.iter().find(|o| o.mesh.0 == mesh).map_or("", |o| &o.mesh.1);
+            let text = format!("{arrow} {} ({count})", named("mesh", mesh, name));
+            if ui.add(Button::selectable(false, text).truncate()).clicked() {
+                app.list.fold(mesh, !row.is_open);
             }
-            _ => {}
+        }
+        RowKind::Node(k) => {
+            let Some(node) = scene.nodes.get(k) else { return };
+            let name = if node.name.is_empty() { "node" } else { &*node.name };
+            let count = node.instances().len();
+            let name = if count > 0 { format!("{name} ({count})") } else { name.to_owned() };
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 2.0;
+                ui.add_space(level);
+                let size = egui::vec2(ARROW_WIDTH - 2.0, ui.available_height());
+                let fold = ui.add_sized(size, Button::new(arrow).frame(false));
+                let verb = if row.is_open { "Fold" } else { "Unfold" };
+                fold.widget_info(|| {
+                    egui::WidgetInfo::labeled(egui::WidgetType::Button, true, format!("{verb} {name}"))
+                });
+                if fold.clicked() {
+                    app.list.fold(k, !row.is_open);
+                }
+                part(app, ui, Selection::Node(k), &name);
+            });
+        }
+        RowKind::Object(k) => {
+            let Some(object) = scene.objects.get(k) else { return };
+            // parts of a node have its name, and meshes or materials of their own
+            let node = row.node.and_then(|at| scene.nodes.get(at)).map_or("", |node| &*node.name);
+            let material = scene.materials.get(object.material).filter(|_| !node.is_empty());
+            let material = material.map_or("", |m| m.name.as_str());
+            let names = [object.name.as_str(), &object.mesh.1, material];
+            let name = names.iter().find(|name| !name.is_empty() && **name != node);
+            let name = named("object", k, name.copied().unwrap_or(node));
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 2.0;
+                indent(ui);
+                part(app, ui, Selection::Object(k), &name);
+            });
+        }
+        RowKind::Camera(k) => {
+            let Some(camera) = scene.cameras.get(k).cloned() else { return };
+            let text = format!("📷 {}", named("Camera", k, &camera.name));
+            ui.horizontal(|ui| {
+                indent(ui);
+                let line = ui.add(Button::selectable(app.followed == Some(k), text).truncate());
+                if line.on_hover_text("Look through this camera").clicked() {
+                    app.set_camera(camera, Some(k));
+                }
+            });
+        }
+        RowKind::Light(k) => {
+            let text = format!("💡 {}", scene.lights.get(k).map_or("", String::as_str));
+            ui.horizontal(|ui| {
+                indent(ui);
+                ui.add(egui::Label::new(text).truncate()).on_hover_text("A light of the file: Hide leaves it as it is");
+            });
         }
     }
-    rows
 }
 
-/// An object of the list: whether it is shown, and its name, which selects it.
-fn object(app: &mut App, ui: &mut Ui, k: usize, object: &ObjectSummary, is_hidden: bool, is_below: bool) {
-    let name = if object.name.is_empty() { object.mesh.1.as_str() } else { object.name.as_str() };
-    let name = named("object", k, name);
-    ui.horizontal(|ui| {
-        if is_below {
-            ui.add_space(ui.spacing().indent);
-        }
-        let mut is_shown = !is_hidden;
-        let shown = ui.checkbox(&mut is_shown, "").on_hover_text("Whether it is in the scene");
+/// An object or a node: whether it is shown, and its name, which selects it.
+fn part(app: &mut App, ui: &mut Ui, selection: Selection, name: &str) {
+    let [all, hidden] = app.hidden_count(selection);
+    let mut is_shown = hidden < all;
+    let is_partly = is_shown && hidden > 0;
+    if all > 0 {
+        let tick = ui.add(egui::Checkbox::without_text(&mut is_shown).indeterminate(is_partly));
+        let shown = tick.on_hover_text("Whether it is in the scene");
         shown.widget_info(|| {
-            egui::WidgetInfo::selected(egui::WidgetType::Checkbox, true, is_shown, format!("Show {name}"))
+            let label = format!("Show {name}");
+            egui::WidgetInfo::selected(egui::WidgetType::Checkbox, true, is_shown && !is_partly, label)
         });
         if shown.changed() {
-            app.hide(k, !is_shown);
+            // a part that is hidden comes back first
+            app.hide(selection, !is_shown && !is_partly);
         }
-        let text = egui::RichText::new(&name);
-        let text = if is_hidden { text.weak() } else { text };
-        let line = ui.add(Button::selectable(app.selected == Some(k), text).truncate());
-        if line.double_clicked() {
-            app.frame_object(k);
-        } else if line.clicked() {
-            app.select(Some(k));
-        }
-    });
+    }
+    let text = egui::RichText::new(name);
+    let text = if all > 0 && hidden == all { text.weak() } else { text };
+    let line = ui.add(Button::selectable(app.selected == Some(selection), text).truncate());
+    if line.double_clicked() {
+        app.frame(selection);
+    } else if line.clicked() {
+        app.select(Some(selection));
+    }
 }
 
 /// The object that is selected: the values of its material, and what a click has met.
 pub fn selection(app: &mut App, ui: &mut Ui) {
-    let Some(k) = app.selected else {
-        ui.weak("Click into the image or the list to select an object.");
-        return;
+    let k = match app.selected {
+        Some(Selection::Object(k)) => k,
+        Some(Selection::Node(_)) => {
+            ui.weak("Select one object to change its material.");
+            return;
+        }
+        None => {
+            ui.weak("Click into the image or the list to select an object.");
+            return;
+        }
     };
     let object = app.scene.as_ref().and_then(|s| s.objects.get(k)).cloned();
     let picked = app.pick.as_ref().map(|pick| pick.material.0);

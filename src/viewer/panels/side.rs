@@ -592,7 +592,8 @@ fn camera(app: &mut App, ui: &mut Ui) {
 fn camera_projection(app: &mut App, ui: &mut Ui, shown: CameraProjection) {
     let mut is_orthographic = matches!(shown, CameraProjection::Orthographic { .. });
     let box_of = ui.checkbox(&mut is_orthographic, "Parallel rays");
-    if box_of.on_hover_text("An orthographic view, as plans and elevations have it\nCtrl + 5").changed() {
+    let help = "An orthographic view, as plans and elevations have it. Rays start at the camera: what is behind it in a room is not seen\nCtrl + 5";
+    if box_of.on_hover_text(help).changed() {
         menu::change_projection(app);
         return;
     }
@@ -608,7 +609,9 @@ fn camera_projection(app: &mut App, ui: &mut Ui, shown: CameraProjection) {
         }
         CameraProjection::Orthographic { half_height } => {
             let (mut height, size) = (2.0 * half_height, app.control.as_ref().map_or(1.0, |c| c.scene_size()));
-            let heading = ui.label("Height of the view").on_hover_text("In scene units");
+            let heading = ui
+                .label("Height of the view")
+                .on_hover_text("In scene units, up to ten times the scene; --orthographic takes any");
             if slider::show(ui, &heading, &mut height, 1e-3 * size..=10.0 * size, Scale::Logarithmic, "") {
                 app.leave_followed();
                 app.control.iter_mut().for_each(|control| control.set_height(height));

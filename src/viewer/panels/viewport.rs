@@ -79,12 +79,12 @@ pub fn keys(app: &mut App, context: &Context) {
     // camera and time
     let shifted = |key| context.input(|i| i.key_pressed(key) && i.modifiers.shift_only());
     match app.selected {
-        Some(object) if shifted(Key::F) => app.frame_object(object),
-        Some(object) if shifted(Key::H) && app.settings.scene.only.is_empty() => app.isolate(object),
+        Some(selected) if shifted(Key::F) => app.frame(selected),
+        Some(selected) if shifted(Key::H) && app.settings.scene.only.is_empty() => app.isolate(selected),
         _ if shifted(Key::H) => app.show_all_objects(),
-        Some(object) if pressed(Key::H) && !context.input(|i| i.modifiers.shift) => {
-            let is_hidden = app.hidden_objects().get(object).copied().unwrap_or_default();
-            app.hide(object, !is_hidden);
+        Some(selected) if pressed(Key::H) && !context.input(|i| i.modifiers.shift) => {
+            let is_hidden = app.is_hidden(selected);
+            app.hide(selected, !is_hidden);
         }
         _ if pressed(Key::F) => menu::frame_all(app),
         _ => {}

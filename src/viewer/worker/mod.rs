@@ -388,7 +388,7 @@ struct ViewerSession<'a> {
     /// Settings of materials and objects are in effect: the scene has all that they name.
     is_edited: bool,
     /// The instance whose outline was sent since the view has moved.
-    outlined: Option<usize>,
+    outlined: Option<std::ops::Range<usize>>,
     /// The hierarchy that was shown last.
     hierarchy: &'a mut KnownHierarchy,
     /// It was sent, with the influence areas of these lights.
@@ -498,8 +498,8 @@ impl ViewerSession<'_> {
 
     /// Sends the outline of what is selected, once for each view at rest.
     fn outline(&mut self, request: &Request, camera: &Camera) -> Result<()> {
-        let Some(object) = request.selected.filter(|_| self.outlined != request.selected) else {
-            self.outlined = self.outlined.filter(|_| request.selected.is_some());
+        let Some(objects) = request.selected.clone().filter(|_| self.outlined != request.selected) else {
+            self.outlined.take_if(|_| request.selected.is_none());
             return Ok(());
         };
         // before the first image there is nothing to be hit
@@ -507,11 +507,11 @@ impl ViewerSession<'_> {
             return Ok(());
         }
         let scene = self.interactive.scene();
-        let bounds = request.animation.is_none().then(|| summary::bounds(scene, object)).flatten();
+        let bounds = request.animation.is_none().then(|| summary::bounds(scene, objects.clone())).flatten();
         let (size, time) = (request.size, request.time);
-        let lines = outline::lines(&self.interactive, camera, object, bounds, size)?;
-        self.outlined = Some(object);
-        self.events.send(Event::Outline(Arc::new(Outline { object, camera: camera.clone(), time, size, lines })));
+        let lines = outline::lines(&self.interactive, camera, &objects, bounds, size)?;
+        self.outlined = Some(objects.clone());
+        self.events.send(Event::Outline(Arc::new(Outline { objects, camera: camera.clone(), time, size, lines })));
         Ok(())
     }
 

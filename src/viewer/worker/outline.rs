@@ -1,6 +1,7 @@
-//! The outline of an object in the image: where rays that hit it lie beside rays that do not.
+//! The outline of objects in the image: where rays that hit one lie beside rays that do not.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::{DVec3, Vec2};
 
@@ -13,15 +14,15 @@ const STRAIGHT: f32 = 0.8;
 /// Most rays that are traced for an outline; fewer than pixels make it coarser.
 const RAYS: f64 = 60_000.0;
 
-/// Points of the lines around an object, from (0, 0) at the top left of the view to (1, 1).
-/// `bounds`: the object's in world space, if it is where they say. `size`: the view's, pixels.
+/// Points of the lines around objects, from (0, 0) at the top left of the view to (1, 1).
+/// `bounds`: the objects' in world space, if they are where it says. `size`: the view's, pixels.
 ///
 /// # Errors
 /// Those of the device.
 pub fn lines(
     session: &Interactive,
     camera: &Camera,
-    object: usize,
+    objects: &Range<usize>,
     bounds: Option<(DVec3, DVec3)>,
     size: [u32; 2],
 ) -> Result<Vec<Vec<[f32; 2]>>> {
@@ -42,7 +43,7 @@ pub fn lines(
         .map(|k| place((k % grid.columns) as f64 + 0.5, (k / grid.columns) as f64 + 0.5))
         .collect();
     let hits = session.objects_at(camera, &points, aspect)?;
-    let mask: Vec<bool> = hits.into_iter().map(|hit| hit == Some(object)).collect();
+    let mask: Vec<bool> = hits.into_iter().map(|hit| hit.is_some_and(|hit| objects.contains(&hit))).collect();
     let points = |line: Vec<Vec2>| {
         let place = |p: Vec2| place(f64::from(p.x), f64::from(p.y)).map(|at| at as f32);
         straightened(&line).into_iter().map(place).collect()

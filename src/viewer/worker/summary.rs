@@ -1,15 +1,17 @@
 //! A summary of a scene for the window: figures, objects, materials.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
 use glam::DVec3;
 
-use crate::scene::{Geometry, Instance, Material, Mesh, Scene};
+use crate::scene::{Geometry, Instance, Light, Material, Mesh, Scene};
 use crate::viewer::request::{ObjectSummary, SceneSummary};
 
-/// Most instances that are listed: the list is made in each frame of the window.
-const MOST: usize = 20_000;
+/// Most instances that are listed, for the memory of their names and bounds.
+const MOST: usize = 500_000;
 
 /// Figures of a scene from a file, or a built-in one, that took this time to load.
 pub fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
@@ -27,6 +29,8 @@ pub fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
         variants: scene.variants.clone(),
         textures: scene.textures.iter().enumerate().map(|(k, t)| name(k, &t.name)).collect(),
         objects: Arc::new(objects(scene)),
+        nodes: Arc::new(scene.nodes.clone()),
+        lights: scene.lights.iter().map(light_name).collect(),
         materials: Arc::new(materials(scene)),
         primitives: scene.triangle_count() + scene.sphere_count(),
         counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],
@@ -37,11 +41,12 @@ pub fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
 /// The instances that are listed.
 fn objects(scene: &Scene) -> Vec<ObjectSummary> {
     let boxes: Vec<Option<(DVec3, DVec3)>> = scene.meshes.iter().map(mesh_bounds).collect();
+    let names: Vec<Arc<str>> = scene.meshes.iter().map(|mesh| mesh.name.as_str().into()).collect();
     let object = |(k, instance): (usize, &Instance)| {
         let mesh = &scene.meshes[instance.mesh];
         ObjectSummary {
             name: instance.name.clone(),
-            mesh: (instance.mesh, mesh.name.clone()),
+            mesh: (instance.mesh, names[instance.mesh].clone()),
             material: mesh.material,
             primitives: mesh.geometry.primitive_count(),
             bounds: boxes[instance.mesh].map(|bounds| placed(instance, bounds)),
@@ -56,10 +61,19 @@ fn materials(scene: &Scene) -> Vec<Material> {
     (0..scene.materials.len()).map(|k| scene.unedited_material(k).clone()).collect()
 }
 
-/// World-space bounds of an instance at rest, those of its mesh's box.
-pub fn bounds(scene: &Scene, instance: usize) -> Option<(DVec3, DVec3)> {
-    let instance = scene.instances.get(instance)?;
-    mesh_bounds(&scene.meshes[instance.mesh]).map(|bounds| placed(instance, bounds))
+fn light_name(light: &Light) -> String {
+    if light.name.is_empty() { light.kind.about().name.to_owned() } else { light.name.clone() }
+}
+
+/// World-space bounds of instances at rest, those of the boxes of their meshes.
+pub fn bounds(scene: &Scene, instances: Range<usize>) -> Option<(DVec3, DVec3)> {
+    let mut of_meshes = BTreeMap::new();
+    let instances = scene.instances.get(instances)?.iter();
+    let boxes = instances.filter_map(|instance| {
+        let bounds = of_meshes.entry(instance.mesh).or_insert_with(|| mesh_bounds(&scene.meshes[instance.mesh]));
+        bounds.map(|bounds| placed(instance, bounds))
+    });
+    boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 fn mesh_bounds(mesh: &Mesh) -> Option<(DVec3, DVec3)> {

@@ -16,11 +16,12 @@ use parse::Statement;
 
 use super::find::Finder;
 use super::model::read_model;
+use super::nodes::NodeTreeBuilder;
 use super::options::Loading;
 use super::{find, finish, text};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
-use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
+use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, NodeTree, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
@@ -30,11 +31,12 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     let wrong = |e: String| Error::input(path, text::shown(&e));
     let statements = parse::statements(&text).map_err(wrong)?;
     let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::new(&loading.options));
-    let mut loader = Loader { path, loading, scene, models, finder };
+    let mut loader = Loader { path, loading, scene, nodes: NodeTreeBuilder::default(), models, finder };
     for mut statement in statements {
         loader.statement(&mut statement)?;
         statement.done().map_err(wrong)?;
     }
+    loader.scene.nodes = loader.nodes.finish(&loader.scene);
     Ok(loader.scene)
 }
 
@@ -42,8 +44,10 @@ struct Loader<'a> {
     path: &'a Path,
     loading: Loading<'a>,
     scene: Scene,
-    /// The instances of each loaded model with each material, relative to the model.
-    models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
+    /// Models, each with what is below it.
+    nodes: NodeTreeBuilder,
+    /// The instances of each loaded model with each material, relative to the model, and its nodes.
+    models: HashMap<(PathBuf, Option<String>), (Vec<Instance>, NodeTree)>,
     finder: Finder,
 }
 
@@ -153,6 +157,8 @@ impl Loader<'_> {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);
                 model.rig = None;
+                let is_kept: Vec<bool> = (0..model.instances.len()).map(|k| !model.hidden.contains(&k)).collect();
+                model.nodes.keep_instances(&is_kept);
                 model.instances = model.shown_instances().cloned().collect();
                 let file = text::shown(file);
                 self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
@@ -165,13 +171,21 @@ impl Loader<'_> {
                 (model.materials, model.textures) = (vec![material], Vec::new());
             }
             self.scene.report.files.push(key.0.clone());
+            let nodes = std::mem::take(&mut model.nodes);
             let placed = self.scene.append(model);
-            self.models.insert(key.clone(), placed);
+            self.models.insert(key.clone(), (placed, nodes));
         }
-        for placed in &self.models[&key] {
+
+        // a node for each use of it
+        let (instances, nodes) = &self.models[&key];
+        let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+        self.nodes.begin(0, &text::shown(name), &self.scene);
+        self.nodes.append(nodes, &self.scene);
+        for placed in instances {
             let object_to_world = to_world * placed.object_to_world;
             self.scene.instances.push(Instance { object_to_world, ..placed.clone() });
         }
+        self.nodes.end(0, &self.scene);
         Ok(())
     }
 }

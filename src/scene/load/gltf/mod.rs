@@ -42,6 +42,7 @@ use rig::{MeshVariant, RigBuilder};
 use values::text;
 
 use super::compact;
+use super::nodes::NodeTreeBuilder;
 use super::options::Loading;
 use crate::error::{Error, Result};
 use crate::scene::material::{VariantMaterials, all_variants};
@@ -127,9 +128,11 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         varied: Vec::new(),
         with_sets: BTreeMap::new(),
     };
+    let mut nodes = NodeTreeBuilder::default();
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
         let name = text(&node.name);
+        nodes.begin(placed.level, name, &scene);
         if let Some(index) = node.mesh.filter(|_| stage.shows(at)) {
             let copies = instancing::read(&reader, node).map_err(|e| input(format!("node {}: {e}", placed.node)))?;
             if node.skin.is_some() && instancing::is_instanced(node) {
@@ -178,6 +181,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     }
     stage.material_copies = meshes.with_sets.iter().map(|((of, _), copy)| (*copy, *of)).collect();
     stage.finish(&mut scene).map_err(input)?;
+    scene.nodes = nodes.finish(&scene);
     scene.report.warnings.append(&mut warnings);
     Ok(scene)
 }

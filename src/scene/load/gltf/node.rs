@@ -71,6 +71,8 @@ pub(super) struct PlacedNode {
     pub node: usize,
     /// Index into the list of placed nodes.
     pub parent: Option<usize>,
+    /// Number of nodes above it.
+    pub level: usize,
     pub local: LocalTransform,
     pub to_world: DAffine3,
     /// Whether the node belongs to the scene that is loaded.
@@ -163,7 +165,8 @@ pub(super) fn place(
             }
             let index = placed.len();
             let visible = above.is_none_or(|p| p.visible) && !is_hidden(node);
-            placed.push(PlacedNode { node: i, parent, local, to_world, shown, visible });
+            let level = above.map_or(0, |p| p.level + 1);
+            placed.push(PlacedNode { node: i, parent, level, local, to_world, shown, visible });
             stack.extend(children(node).rev().map(|c| (c, Some(index))));
         }
     }

@@ -5,7 +5,8 @@
 //! obj-rs names no line of an error, wavefront_obj refuses vertex colours and relative indices, and
 //! nobject-rs and wavefront take broken numbers without a word.
 //!
-//! Each run of faces with one object or group name and one material becomes a mesh. Polygons are
+//! Each run of faces with one object, one group and one material becomes a mesh, with the name of
+//! its group or, before the first `g` of an object, that of the object. Polygons are
 //! cut into fans, or by ear clipping where a fan would reach outside of them. Corners without `vn`
 //! are shaded smoothly in a smoothing group, and flat outside of one.
 
@@ -27,6 +28,7 @@ use material::MaterialLibrary;
 use parse::{Group, NONE, ObjFile};
 
 use super::find;
+use super::nodes::NodeTreeBuilder;
 use super::options::{Loading, NormalSource};
 use super::text::{self, unquoted, without_comment};
 use crate::error::Result;
@@ -68,7 +70,9 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         file.groups.iter_mut().flat_map(|g| g.triangles.iter_mut().flatten()).for_each(|c| c.normal = NONE);
     }
     let mut keys = PositionKeys::new(file.positions.len());
+    let mut nodes = Nodes::default();
     for group in std::mem::take(&mut file.groups) {
+        nodes.begin(&group, &scene);
         let material = match &group.material {
             None => *grey.get_or_insert_with(|| push(&mut scene, material::grey(String::new()))),
             Some(name) => match materials.get(name) {
@@ -90,7 +94,37 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
         scene.instances.push(Instance { name: name.clone(), mesh, object_to_world });
         scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material, source: None });
     }
+    scene.nodes = nodes.builder.finish(&scene);
     Ok(scene)
+}
+
+/// The nodes of a file: an object is above its groups, and a group above its runs of one material.
+#[derive(Default)]
+struct Nodes {
+    builder: NodeTreeBuilder,
+    /// Names of the object and the group that are open; empty for none.
+    open: [String; 2],
+}
+
+impl Nodes {
+    /// Begins what a run of faces is in, unless the one before was in the same.
+    fn begin(&mut self, run: &Group, scene: &Scene) {
+        // faces after `o` alone have its name
+        let group = if run.name == run.object { "" } else { &*run.name };
+        let names = [&*run.object, group];
+        let Some(first) = (0..2).find(|k| self.open[*k] != names[*k]) else { return };
+
+        // from the first that differs on
+        let mut level = names[..first].iter().filter(|name| !name.is_empty()).count();
+        self.builder.end(level, scene);
+        for (open, name) in self.open.iter_mut().zip(names).skip(first) {
+            name.clone_into(open);
+            if !name.is_empty() {
+                self.builder.begin(level, &text::shown(name), scene);
+                level += 1;
+            }
+        }
+    }
 }
 
 /// Warnings that name statements which are not used.

@@ -65,10 +65,13 @@ pub(super) struct Corner {
     pub normal: u32,
 }
 
-/// Consecutive faces with one name and one material. Names are texts of [`text`].
+/// Consecutive faces with one name, one object and one material. Names are texts of [`text`].
 #[derive(Debug)]
 pub(super) struct Group {
+    /// Name by `o` or `g`, whichever came last.
     pub name: String,
+    /// Name by the last `o`; empty without one.
+    pub object: String,
     pub material: Option<String>,
     pub triangles: Vec<[Corner; 3]>,
     /// Where a smoothing group begins: index of a triangle, and the group's number; 0 for none, and
@@ -126,6 +129,7 @@ pub(super) fn parse(path: &Path, budget: &Budget) -> Result<ObjFile> {
 struct Parser {
     file: ObjFile,
     name: String,
+    object: String,
     material: Option<String>,
     /// Whether name or material changed since the last face.
     changed: bool,
@@ -160,6 +164,9 @@ impl Parser {
             "f" | "fo" => self.face(rest),
             "o" | "g" => {
                 rest.clone_into(&mut self.name);
+                if key == "o" {
+                    rest.clone_into(&mut self.object);
+                }
                 self.changed = true;
                 Ok(())
             }
@@ -255,9 +262,11 @@ impl Parser {
         };
         if self.changed || self.file.groups.is_empty() {
             self.changed = false;
-            let (name, material) = (self.name.clone(), self.material.clone());
-            if self.file.groups.last().is_none_or(|g| g.name != name || g.material != material) {
-                self.file.groups.push(Group { name, material, triangles: Vec::new(), smoothing: Vec::new() });
+            let [name, object] = [&self.name, &self.object];
+            let is_same = |g: &Group| g.name == *name && g.object == *object && g.material == self.material;
+            if !self.file.groups.last().is_some_and(is_same) {
+                let (name, object, material) = (name.clone(), object.clone(), self.material.clone());
+                self.file.groups.push(Group { name, object, material, triangles: Vec::new(), smoothing: Vec::new() });
             }
         }
         if let Some(group) = self.file.groups.last_mut() {
