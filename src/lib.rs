@@ -44,6 +44,7 @@ pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod shaders;
+pub mod stage;
 pub mod stress;
 #[cfg(feature = "cli")]
 pub mod terminal;

@@ -17,7 +17,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, Macro, UseTree};
 /// Rooms of src/ (folders, and files beside lib.rs) from the bottom up. A room uses rooms of lower layers only, none of its own layer.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["memory"],
+    &["memory", "stage"],
     &["colour", "files"],
     &["settings"],
     &["interface"],

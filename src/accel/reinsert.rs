@@ -9,6 +9,8 @@ use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
 
+use crate::stage;
+
 /// Box of a node as two registers; the fourth lanes are integers and take no part.
 #[inline(always)]
 fn corners(node: &Bvh2Node) -> [Vec4; 2] {
@@ -65,6 +67,7 @@ pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
     if nodes.len() < 7 || options.rounds == 0 {
         return;
     }
+    let _stage = stage::begin("optimising the BVH");
     let total: f64 = nodes.par_iter().with_min_len(1 << 14).map(|n| area(corners(n)) as f64).sum();
 
     // the search climbs, so that it needs the parents

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::Aabb;
 use super::build::MAX_DEPTH;
+use crate::stage;
 
 /// A primitive's box during the build. The fourth lanes contain the primitive's index as a normal
 /// float, so that SIMD arithmetic on them is fast (no denormals, no NaN).
@@ -216,6 +217,7 @@ fn subtree(items: &mut [Item], root: &mut Bvh2Node, below: &mut [Bvh2Node], firs
         binned(items, centres).unwrap_or_else(|| halve(items, centres))
     };
     let (left, right) = items.split_at_mut(middle);
+    let sizes = [left.len(), right.len()];
     let (children, below) = below.split_at_mut(2);
     let (a, b) = children.split_at_mut(1);
     let (below_left, below_right) = below.split_at_mut(2 * left.len() - 2);
@@ -223,7 +225,13 @@ fn subtree(items: &mut [Item], root: &mut Bvh2Node, below: &mut [Bvh2Node], firs
     let mut go_left = || subtree(left, &mut a[0], below_left, first_left, depth + 1);
     let mut go_right = || subtree(right, &mut b[0], below_right, first_right, depth + 1);
     if n >= PARALLEL {
-        rayon::join(go_left, go_right);
+        let counted = |count: usize, go: &mut dyn FnMut()| {
+            go();
+            if count < PARALLEL {
+                stage::advance(count as u64);
+            }
+        };
+        rayon::join(|| counted(sizes[0], &mut go_left), || counted(sizes[1], &mut go_right));
     } else {
         go_left();
         go_right();

@@ -14,6 +14,7 @@ use super::Aabb;
 use super::build::MAX_DEPTH;
 use super::clip::{Triangles, clip};
 use super::sah::{self, Bounds, Item};
+use crate::stage;
 
 const BINS: usize = 16;
 /// A spatial split is looked for where the halves overlap in more than this share of the whole
@@ -52,8 +53,9 @@ impl<T: Triangles> Builder<'_, T> {
     /// Nodes of a subtree, its root first, numbered from 0.
     fn parallel(&self, items: Vec<Item>, budget: usize, depth: u32) -> Vec<Bvh2Node> {
         if items.len() < sah::PARALLEL {
-            let mut out = vec![Bvh2Node::default()];
+            let (count, mut out) = (items.len(), vec![Bvh2Node::default()]);
             self.serial(items, budget, depth, 0, &mut out);
+            stage::advance(count as u64);
             return out;
         }
         let bounds = sah::bounds_of(&items).0;

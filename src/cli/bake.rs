@@ -198,7 +198,7 @@ enum Output {
 
 /// Checks what can be known before the scene is read.
 fn check(args: &BakeArgs) -> Result<Output> {
-    args.device.check()?;
+    args.device.check_with_files()?;
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let output = match extension.as_str() {
         "glb" | "gltf" => Output::Model,

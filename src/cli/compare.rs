@@ -225,7 +225,7 @@ impl CompareArgs {
                 setting.option()
             )));
         }
-        self.device.check()?;
+        self.device.check_with_files()?;
         let mut settings = render::settings(&words, &shared)?;
         if self.instance.is_some() {
             settings.iter_mut().for_each(render::add_ids);

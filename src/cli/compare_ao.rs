@@ -130,7 +130,7 @@ pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
 impl AoVsPathArgs {
     /// Checks the arguments, and returns which files are read and written.
     fn check(&self) -> Result<FilePlan> {
-        self.device.check()?;
+        self.device.check_with_files()?;
         self.camera.check()?;
         let mut plan = FilePlan::default();
         plan.reads("the scene", &self.scene);

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::output::parse_size;
 use crate::renderer::interactive::camera_settings;
+use crate::renderer::memory_estimate::MemoryEstimate;
 use crate::renderer::report::milliseconds;
 use crate::renderer::settings::options_text;
 use crate::renderer::{RenderSettings, Renderer};
@@ -17,7 +18,7 @@ use crate::scene::inventory::Inventory;
 use crate::scene::{Scene, SceneSettings};
 use crate::settings::Length;
 use crate::terminal::console::Failure;
-use crate::terminal::interrupt::{self, SilentControl};
+use crate::terminal::interrupt::{self, Abandonable, SilentControl};
 use crate::terminal::progress::Progress;
 use crate::terminal::warnings::Warnings;
 use crate::tracer::DeviceSettings;
@@ -30,6 +31,9 @@ const SKETCH_SIZE: [u32; 2] = [96, 54];
 const SKETCH_SPP: u32 = 8;
 /// Mean radiance of surfaces in a well exposed image.
 const MIDDLE_GREY: f64 = 0.2;
+/// Triangles and spheres of the largest scene through which rays are traced without --measure: a
+/// larger one takes seconds to build a BVH for.
+const MEASURED: u64 = 4_000_000;
 /// Names of objects, of nodes and of materials that text shows; `--json` has all.
 const SHOWN_NAMES: usize = 8;
 
@@ -45,6 +49,12 @@ pub struct InfoArgs {
     /// Describe the file alone: no device is opened, and nothing is rendered
     #[arg(long)]
     pub no_device: bool,
+    /// Trace rays through a scene of more than 4 million triangles, too
+    ///
+    /// Suggestions and the time of a frame come from rays, for which a BVH is built. In a larger
+    /// scene that takes as long as in `skylit render`, and is left out by default.
+    #[arg(long, conflicts_with = "no_device")]
+    pub measure: bool,
     /// Files of the scene
     #[command(flatten)]
     pub load: LoadArgs,
@@ -101,22 +111,28 @@ struct OnDevice {
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
+    let _abandonable = Abandonable::begin(args.json);
     if image_info::is_image(&args.scene) {
         if args.size.is_some() {
             return Err(Error::Usage(format!("--size is for scenes, and {} is an image", args.scene)).into());
         }
         return image_info::run(&args.scene, &console);
     }
+    args.device.check_with_files()?;
     let mut scene = args.load.load(&args.scene, &console)?;
     args.meaning.apply(&mut scene)?;
     let mut warnings = Warnings::new(console);
     scene.report.all_warnings().iter().for_each(|w| warnings.add(w));
 
     // what the file has
+    let counting = Progress::of_silent_work("counting", &console);
     let inventory = Inventory::from_scene(&scene);
+    drop(counting);
     let format = format_of(&args.scene);
     let extensions = scene.report.extensions.clone();
+    let memory = MemoryEstimate::from_scene(&scene);
     describe(&inventory, &scene, format).iter().try_for_each(|line| console.line(line))?;
+    console.line(&memory_line(&memory))?;
     let mut record = json!({
         "scene": args.scene,
         "format": format,
@@ -130,10 +146,18 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         "tangents_computed": scene.report.tangents_computed,
         "texcoords_projected": scene.report.texcoords_projected,
         "inventory": inventory,
+        "memory": memory,
     });
+    record["memory"]["peak"] = json!(memory.peak());
 
     // what a render of it would be like
-    if !args.no_device {
+    let is_large = inventory.unique_triangles + inventory.spheres > MEASURED;
+    if !args.no_device && is_large && !args.measure {
+        console.line(&format!(
+            "{:<12}camera, AO radius and time are not suggested for so large a scene: --measure traces rays for them",
+            "rays"
+        ))?;
+    } else if !args.no_device {
         let mut progress = Progress::new("looking at the scene", &console);
         match on_device(args, scene, &mut progress) {
             Ok((suggestions, on_device)) => {
@@ -265,6 +289,19 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         add("extensions", extensions.iter().map(noted).collect::<Vec<_>>().join(", "));
     }
     lines
+}
+
+/// The memory that a render is estimated to take.
+fn memory_line(m: &MemoryEstimate) -> String {
+    format!(
+        "{:<12}a render takes about {}: the program {}, the scene {}, building its BVH {}, in device memory {}",
+        "memory",
+        bytes_text(m.peak()),
+        bytes_text(m.program),
+        bytes_text(m.scene),
+        bytes_text(m.build),
+        bytes_text(m.device)
+    )
 }
 
 /// The first names of a list, and how many more there are.
@@ -421,7 +458,7 @@ impl OnDevice {
             format!("{:<12}{}, tracer {}", "device", self.device, self.tracer),
             format!(
                 "{:<12}{}: acceleration structures {}, the rest of the scene {} (with materials and textures)",
-                "memory",
+                "on device",
                 bytes_text(self.structure_bytes + self.scene_bytes),
                 bytes_text(self.structure_bytes),
                 bytes_text(self.scene_bytes)

@@ -212,6 +212,10 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
         // nothing can be done about a stdout that fails now
         let _ = console::json(&serde_json::json!({ "error": message, "exit_code": code }));
     }
+    if code == Error::Interrupted.exit_code() {
+        // a driver may still be at work, and nobody waits for its end
+        threads::end_process(code);
+    }
     ExitCode::from(code)
 }
 

@@ -21,7 +21,7 @@ use crate::tracer::{Needs, Tracer};
 
 /// Loads, traces, and reports.
 pub fn run(args: &RaysArgs) -> Result<()> {
-    args.device.check()?;
+    args.device.check_with_files()?;
     interrupt::install();
 
     // files are checked before anything is loaded

@@ -160,7 +160,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let files = args.config.files(scene.map(String::as_str), confine)?;
     let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
     let (settings, device_settings) = (resolved.settings, resolved.device);
-    device_settings.check()?;
+    device_settings.check_with_files()?;
     config::report(args.verbosity.console(), &resolved.reports);
 
     if args.painter == Some(Painter::Vulkan) {

@@ -20,6 +20,7 @@ use crate::error::{Error, Result};
 use crate::interface::constants::Constant;
 use crate::interface::records::ray::Push;
 use crate::shaders::{ComputeShader, Shader, specialize};
+use crate::stage::{self, Stage};
 
 /// Size in bytes of the push-constant block, the same for all pipelines.
 pub(super) const PUSH_BYTES: u32 = size_of::<Push>() as u32;
@@ -148,12 +149,12 @@ pub fn compile_seconds() -> f64 {
     COMPILE_SECONDS.get()
 }
 
-/// Adds the time until it is dropped to [`compile_seconds`].
-pub(super) struct CompileTimer(Instant);
+/// Adds the time until it is dropped to [`compile_seconds`], and is a stage meanwhile.
+pub(super) struct CompileTimer(Instant, #[expect(dead_code, reason = "it is a guard")] Stage);
 
 impl CompileTimer {
     pub(super) fn start() -> Self {
-        Self(Instant::now())
+        Self(Instant::now(), stage::begin("compiling kernels"))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::integrators::lighting::LightingSettings;
 use crate::scene::{Camera, ClipPlanes, Scene, SceneSettings};
 use crate::settings::{Capability, Length};
+use crate::stage;
 
 /// Metadata key of the options that were chosen ([`Completed::chosen`]).
 pub const CHOSEN: &str = "chosen";
@@ -54,6 +55,8 @@ impl Renderer {
     /// # Errors
     /// Those of the settings that do not fit the scene.
     pub fn complete(&mut self, settings: &RenderSettings, camera: Option<Camera>) -> Result<Completed> {
+        let _stage = stage::begin("choosing what is left open");
+
         // what is chosen is chosen for what stands on the ground
         self.scene.take_ground();
         self.want_ground(settings.image.ground.unwrap_or_default(), settings.image.ground_height);

@@ -31,6 +31,7 @@ pub mod film_file;
 pub mod frames;
 pub mod interactive;
 mod laps;
+pub mod memory_estimate;
 mod quality;
 pub mod report;
 pub mod settings;

@@ -29,6 +29,7 @@ use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, pi
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
 use crate::settings::Capability;
+use crate::stage;
 use crate::tracer::{Needs, Tracer};
 
 /// Additional results of a still.
@@ -169,7 +170,9 @@ impl Renderer {
         render.resume(control)?;
 
         // the scene in device memory, and what of the image can show it
+        let preparing = stage::begin("preparing the scene");
         let flat = FlatScene::with_motion_and_blend(&self.scene, Motion::default(), render.integrator.blend())?;
+        drop(preparing);
         laps.lap("prepare");
         let ready = render.build(ready, &flat, denoiser.is_some(), control)?;
         let tracer = &ready.tracer;

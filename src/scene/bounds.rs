@@ -143,16 +143,20 @@ struct Shape<'a> {
 impl<'a> Shape<'a> {
     /// `None` for a mesh without primitives.
     fn new(geometry: &'a Geometry) -> Option<Self> {
-        let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        match geometry {
-            Geometry::Triangles(t) => t.indices.iter().flatten().for_each(|&i| {
-                let p = t.positions[i as usize];
-                (lo, hi) = (lo.min(p), hi.max(p));
-            }),
-            Geometry::Spheres(s) => {
-                s.iter().for_each(|s| (lo, hi) = (lo.min(s.center - s.radius), hi.max(s.center + s.radius)))
+        let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let (lo, hi) = match geometry {
+            Geometry::Triangles(t) => {
+                let add = |(lo, hi): (Vec3, Vec3), triangle: &[u32; 3]| {
+                    let [a, b, c] = triangle.map(|i| t.positions[i as usize]);
+                    (lo.min(a).min(b).min(c), hi.max(a).max(b).max(c))
+                };
+                let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+                t.indices.par_iter().with_min_len(BLOCK).fold(none, add).reduce(none, union)
             }
-        }
+            Geometry::Spheres(s) => {
+                s.iter().fold(none(), |(lo, hi), s| (lo.min(s.center - s.radius), hi.max(s.center + s.radius)))
+            }
+        };
         let (lo, hi) = (lo.as_dvec3(), hi.as_dvec3());
         let is_empty = geometry.primitive_count() == 0;
         (!is_empty).then(|| Self {

@@ -1,13 +1,13 @@
 //! Counts of what a scene is made of: for people and programs that look at it before they render
 //! it.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::material::MaterialKind;
-use super::{AlphaMode, Environment, Geometry, Material, Scene, TriangleMesh};
+use super::open_edges::open_edges;
+use super::{AlphaMode, Environment, Geometry, Material, Scene};
 
 /// Counts of a scene.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -135,29 +135,6 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     names.filter(|name| !name.is_empty() && seen.insert(*name)).map(str::to_owned).collect()
 }
 
-/// Edges of one triangle only, where vertices at the same place are one.
-pub(crate) fn open_edges(mesh: &TriangleMesh) -> u64 {
-    let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
-    // 0 and -0 are one place
-    let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
-    let vertex: Vec<u32> = mesh
-        .positions
-        .iter()
-        .map(|p| {
-            let next = places.len() as u32;
-            *places.entry(key(*p)).or_insert(next)
-        })
-        .collect();
-    let mut edges: Vec<(u32, u32)> = mesh
-        .indices
-        .iter()
-        .flat_map(|t| [0, 1, 2].map(|k| (vertex[t[k] as usize], vertex[t[(k + 1) % 3] as usize])))
-        .map(|(a, b)| (a.min(b), a.max(b)))
-        .collect();
-    edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).count() as u64
-}
-
 /// The model of a material, and what extends it.
 fn model(material: &Material) -> String {
     let model = match material.kind {
@@ -238,15 +215,5 @@ mod tests {
         assert!(spheres.spheres > 0);
         let parade = inventory("parade");
         assert!(!parade.animations.is_empty());
-    }
-
-    #[test]
-    fn edges_of_one_triangle_are_open() {
-        let mesh = |name: &str| builtin::by_name(name).unwrap().meshes.swap_remove(0).geometry;
-        let Geometry::Triangles(mut closed) = mesh("closed-box") else { panic!("a box has triangles") };
-        // its sides have vertices of their own, at the same places
-        assert_eq!(open_edges(&closed), 0);
-        closed.indices.pop();
-        assert_eq!(open_edges(&closed), 3);
     }
 }

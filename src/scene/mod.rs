@@ -26,6 +26,7 @@ pub mod material_edit;
 pub mod mesh;
 pub mod motion;
 pub mod nodes;
+pub(crate) mod open_edges;
 pub mod orbit;
 pub mod settings;
 pub mod sky;

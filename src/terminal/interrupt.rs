@@ -1,17 +1,86 @@
 //! Signals. Ctrl-C and SIGTERM: the first asks for a clean stop, the second ends the process at
-//! once. A file that exceeds the limit for files (`ulimit -f`) is an error of its write.
+//! once. Work that asks nobody while it lasts, as building a hierarchy does, is given up soon after
+//! the first ([`Abandonable`]). A file that exceeds the limit for files (`ulimit -f`) is an error
+//! of its write.
 
-use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::time::Duration;
 
 use crate::error::{Error, Result};
 use crate::film::Control;
+use crate::gpu::threads::end_process;
 use crate::scene::load;
-
 use crate::terminal::progress::Progress;
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static INSTALL: Once = Once::new();
+/// Number of [`Abandonable`] that live, and whether any is to print a record.
+static ABANDONABLE: Mutex<(usize, bool)> = Mutex::new((0, false));
+/// Time that abandonable work has to answer a request to stop.
+const PATIENCE: Duration = Duration::from_millis(600);
+
+/// Work that may be given up at any point: it writes nothing, or files that appear whole. If it has
+/// not ended a moment after a request to stop, the process ends as an interrupted one does.
+///
+/// It is over where it is dropped, or ended because files are written of which there have to be all
+/// or none.
+#[must_use]
+pub struct Abandonable {
+    has_ended: AtomicBool,
+}
+
+impl Abandonable {
+    /// Begins such work. `json`: an interrupted process prints a record.
+    pub fn begin(json: bool) -> Self {
+        let mut all = abandonable();
+        *all = (all.0 + 1, json);
+        Self { has_ended: AtomicBool::new(false) }
+    }
+
+    /// From here on the work is not given up.
+    pub fn end(&self) {
+        if !self.has_ended.swap(true, Ordering::Relaxed) {
+            abandonable().0 -= 1;
+        }
+    }
+}
+
+impl Drop for Abandonable {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn abandonable() -> MutexGuard<'static, (usize, bool)> {
+    ABANDONABLE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the process as an interrupted one, without waiting for what other threads do. `json`: it
+/// prints a record.
+pub fn end_interrupted(json: bool) -> ! {
+    let (message, code) = (Error::Interrupted.to_string(), Error::Interrupted.exit_code());
+    super::console::error(&message);
+    if json {
+        // nothing can be done about a stdout that fails now
+        let _ = super::console::json(&serde_json::json!({ "error": message, "exit_code": code }));
+    }
+    end_process(code)
+}
+
+/// Ends the process if abandonable work has not ended after [`PATIENCE`].
+fn abandon_later() {
+    let wait = || {
+        std::thread::sleep(PATIENCE);
+        // whoever ends the work meanwhile waits for this lock, and says nothing twice
+        let all = abandonable();
+        if all.0 > 0 {
+            end_interrupted(all.1);
+        }
+    };
+    // without a further thread the work ends when it asks, or by a second request
+    let _ = std::thread::Builder::new().name("interrupt".into()).spawn(wait);
+}
 
 /// Installs the signal handler. Without it, signals end the process as usual.
 pub fn install() {
@@ -25,11 +94,12 @@ pub fn install() {
             // loading asks nobody, and leaves nothing behind
             let is_loading = load::is_in_progress();
             if is_loading {
-                super::console::error(&Error::Interrupted.to_string());
+                end_interrupted(abandonable().1);
             }
-            if REQUESTED.swap(true, Ordering::Relaxed) || is_loading {
-                std::process::exit(i32::from(Error::Interrupted.exit_code()));
+            if REQUESTED.swap(true, Ordering::Relaxed) {
+                end_process(Error::Interrupted.exit_code());
             }
+            abandon_later();
         });
     });
 }

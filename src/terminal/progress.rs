@@ -1,17 +1,26 @@
-//! Progress on stderr: a bar on a terminal, for work that takes longer than a second; else, as in
+//! Progress on stderr: a bar on a terminal, for work that takes longer than a moment; else, as in
 //! the log of a build server, a line from time to time.
+//!
+//! A thread draws the bar, so that it moves also in stages that report nothing ([`stage`]): their
+//! names and shares stand beside what the work is called.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
+use crate::stage;
 use crate::terminal::console::{Console, note, visible};
 
 /// Time after which the bar appears.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PATIENCE: Duration = Duration::from_millis(90);
+/// Time between two looks at what is done.
+const TICK: Duration = Duration::from_millis(100);
 /// Variable of the environment that replaces [`LINE_SECONDS`]; 0: no lines.
 const LINE_VARIABLE: &str = "SKYLIT_PROGRESS_SECONDS";
 /// Minimum time between two lines.
@@ -21,8 +30,16 @@ const MAX_WAIT: u32 = 6;
 /// Share of the work that is worth a line.
 const LINE_SHARE: f64 = 0.1;
 
-/// A progress bar that appears after one second if stderr is a terminal, else lines.
+/// A progress bar that appears after a moment if stderr is a terminal, else lines.
 pub struct Progress {
+    shown: Arc<Mutex<Shown>>,
+    /// Thread that draws, and what ends it where it is dropped; `None` where nothing is to be
+    /// drawn, or there can be no thread.
+    ticker: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+/// The part of a progress that the thread draws.
+struct Shown {
     label: Cow<'static, str>,
     start: Instant,
     visible: bool,
@@ -36,41 +53,76 @@ pub struct Progress {
 impl Progress {
     /// Progress of the work that starts now.
     pub fn new(label: impl Into<Cow<'static, str>>, console: &Console) -> Self {
+        Self::start(label, console, false)
+    }
+
+    /// As [`Progress::new`], for work that does not report by itself when it is time for a line:
+    /// lines are printed by the thread, too.
+    pub fn of_silent_work(label: impl Into<Cow<'static, str>>, console: &Console) -> Self {
+        Self::start(label, console, true)
+    }
+
+    fn start(label: impl Into<Cow<'static, str>>, console: &Console, prints_lines: bool) -> Self {
         let wanted = !console.json && !console.quiet;
-        Self {
+        let is_terminal = stderr().is_terminal();
+        let shown = Arc::new(Mutex::new(Shown {
             label: label.into(),
             start: Instant::now(),
-            visible: wanted && stderr().is_terminal(),
-            lines: (wanted && !stderr().is_terminal()).then(LinePace::from_environment).flatten(),
+            visible: wanted && is_terminal,
+            lines: (wanted && !is_terminal).then(LinePace::from_environment).flatten(),
             at: (0, 1),
             bar: None,
-        }
+        }));
+        let ticks = wanted && (is_terminal || prints_lines);
+        let ticker = ticks.then(|| Self::start_ticker(shown.clone(), prints_lines)).flatten();
+        Self { shown, ticker }
+    }
+
+    fn start_ticker(shown: Arc<Mutex<Shown>>, prints_lines: bool) -> Option<(Sender<()>, JoinHandle<()>)> {
+        let (sender, end) = channel::<()>();
+        let show = move || {
+            while end.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
+                let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                if prints_lines {
+                    shown.line();
+                }
+                shown.draw_in_time();
+            }
+        };
+        let thread = std::thread::Builder::new().name("progress".into()).spawn(show).ok()?;
+        Some((sender, thread))
+    }
+
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// `done` of `total` units are finished.
     pub fn set(&mut self, done: u64, total: u64) {
-        self.at = (done, total);
-        self.line();
-        if self.start.elapsed() >= PATIENCE {
-            self.draw();
-        }
+        let mut shown = self.shown();
+        shown.at = (done, total);
+        shown.line();
+        shown.draw_in_time();
     }
 
     /// Sets the label and shows it immediately, because the next update may take long.
     pub fn phase(&mut self, label: impl Into<Cow<'static, str>>) {
-        self.label = label.into();
-        self.line();
-        self.draw();
+        let mut shown = self.shown();
+        shown.label = label.into();
+        shown.line();
+        shown.draw();
     }
 
     /// Hides the bar while `write` writes to the terminal.
     pub fn suspend<R>(&self, write: impl FnOnce() -> R) -> R {
-        match &self.bar {
+        match &self.shown().bar {
             Some(bar) => bar.suspend(write),
             None => write(),
         }
     }
+}
 
+impl Shown {
     /// Prints a line, if it is time for one.
     fn line(&mut self) {
         let Self { lines: Some(pace), at: (done, total), .. } = self else { return };
@@ -80,27 +132,49 @@ impl Progress {
         }
     }
 
+    fn draw_in_time(&mut self) {
+        if self.start.elapsed() >= PATIENCE {
+            self.draw();
+        }
+    }
+
     fn draw(&mut self) {
         if !self.visible {
             return;
         }
-        let (done, total) = self.at;
         let bar = self.bar.get_or_insert_with(|| {
-            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+            let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(10));
             // if the template did not parse, the default style would do
-            if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent}%{left}") {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{bar:40}] {percent}% {elapsed}{left}") {
                 bar.set_style(style.with_key("left", left).progress_chars("=> "));
             }
             bar.with_elapsed(self.start.elapsed())
         });
-        let label = visible(&self.label, &[]);
+
+        // a stage of the work, in place of the work itself, whose own share stands still meanwhile
+        let stage = stage::current();
+        let (done, total) = match stage.as_ref().and_then(|s| s.share) {
+            Some(share) => ((share * STAGE_STEPS as f64) as u64, STAGE_STEPS),
+            None => self.at,
+        };
+        let label = match stage {
+            Some(stage) => Cow::Owned(format!("{}: {}", self.label, stage.name)),
+            None => Cow::Borrowed(&*self.label),
+        };
+        let label = visible(&label, &[]);
         if bar.message() != label {
             bar.set_message(label);
+            // the time that is left is that of this work
+            bar.reset_eta();
         }
         bar.set_length(total);
         bar.set_position(done);
+        bar.tick();
     }
 }
+
+/// Steps that the share of a stage is shown in.
+const STAGE_STEPS: u64 = 1000;
 
 /// When lines are printed: not more often than `interval`, and then once another tenth of the work
 /// is done, or after a longer wait.
@@ -163,7 +237,12 @@ fn left(state: &ProgressState, out: &mut dyn Write) {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
+        if let Some((sender, thread)) = self.ticker.take() {
+            drop(sender);
+            // it draws, and cannot fail in a way that matters here
+            let _ = thread.join();
+        }
+        if let Some(bar) = &self.shown().bar {
             bar.finish_and_clear();
         }
     }

@@ -10,6 +10,7 @@ use crate::accel::bvh2;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
+use crate::stage;
 
 /// Hierarchies on the host.
 pub(super) enum Trees {
@@ -42,6 +43,7 @@ impl Trees {
                 Kernel::Nearest
             )));
         }
+        let _stage = stage::begin_counted("building the BVH", total as u64);
         Ok(match kernel {
             Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
             Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options)?, kernel),

@@ -60,6 +60,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::interface::constants;
 use crate::shaders::{self, ComputeShader, Mode, StreamShaders};
+use crate::stage;
 use gpu_scene::GpuScene;
 use hierarchy::Hierarchy;
 use lane_budget::lane_budget;
@@ -207,6 +208,7 @@ impl Tracer {
         let start = Instant::now();
 
         // then the scene's buffers, and the structure in device memory
+        let _stage = stage::begin("uploading the scene");
         let mut scene = GpuScene::new(device, flat, needs)?;
         let structure = match hierarchy {
             Some(trees) => {

@@ -268,6 +268,16 @@ impl DeviceSettings {
         }
     }
 
+    /// As [`DeviceSettings::check`], and reads the files that options name: a mistake in one costs
+    /// no loading of a scene.
+    ///
+    /// # Errors
+    /// Those of [`DeviceSettings::check`] and of [`Placement::read_list`].
+    pub fn check_with_files(&self) -> Result<()> {
+        self.check()?;
+        self.areas_file().map_or(Ok(()), |file| Placement::read_list(file).map(|_| ()))
+    }
+
     /// Checks the options of builds for known rays.
     fn check_heuristic(&self) -> Result<()> {
         let rays = match (self.build_direction, self.build_eye) {

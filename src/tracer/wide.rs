@@ -31,6 +31,7 @@ use crate::interface::records::hierarchy::{
 };
 use crate::ray::Ray;
 use crate::scene::Geometry;
+use crate::stage;
 
 /// The hierarchies on the host.
 pub(super) struct Trees {
@@ -556,6 +557,8 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
         })
         .collect();
     drop(single);
+    // the builder counts pairs, and the stage triangles
+    stage::advance((triangles.indices.len() - pairs.len()) as u64);
     if boxes.is_empty() {
         return WideBvh::default();
     }

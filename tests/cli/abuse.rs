@@ -830,3 +830,45 @@ fn loading_is_interrupted_at_once() {
     ends(&out, 130, "interrupted");
     assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
 }
+
+/// Ctrl-C ends a render in each stage before its first sample, once and without a file: a builder asks nobody whether it
+/// is to stop.
+#[test]
+fn gpu_building_is_given_up() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let image = place(&dir, "a.png");
+    for (milliseconds, options) in
+        [(700, &[][..]), (1400, &["--json"]), (2100, &["--build", "best"]), (3500, &["--json"])]
+    {
+        let args = ["render", "builtin:terrain:9000000", "-o", &image, "--tracer", "compute"];
+        let mut program = skylit(&[&args[..], options].concat());
+        let child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let out = child.wait_with_output().unwrap();
+        ends(&out, 130, "interrupted");
+        assert_eq!(stderr(&out).matches("interrupted").count(), 1, "{}", stderr(&out));
+        let record = serde_json::from_slice::<serde_json::Value>(&out.stdout).ok();
+        assert_eq!(record.map(|r| r["exit_code"] == 130), options.contains(&"--json").then_some(true));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "after {milliseconds} ms");
+    }
+}
+
+/// A mistake in the file of influence areas costs no loading of a scene.
+#[test]
+fn areas_are_read_before_the_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, image, areas) = (place(&dir, "gone.glb"), place(&dir, "a.png"), place(&dir, "areas.json"));
+    let build = ["--traversal", "nearest", "--build", "pah", "--build-areas", &areas];
+    let commands = [&["render", &scene, "-o", &image][..], &["info", &scene]];
+    for command in commands {
+        ends(&run(&[command, &build].concat()), 3, "areas.json");
+    }
+    std::fs::write(&areas, "[{}]").unwrap();
+    for command in commands {
+        ends(&run(&[command, &build].concat()), 3, "is no list of influence areas");
+    }
+}

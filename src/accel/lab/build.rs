@@ -12,6 +12,7 @@ use super::heuristic::{AxisRule, CostRule, Heuristic, facing_axes};
 use super::projection::RayDistribution;
 use crate::accel::Aabb;
 use crate::accel::build::MAX_DEPTH;
+use crate::stage;
 
 /// Most primitives of a leaf: those that a reference of the binary kernel can count.
 const MAX_LEAF: u32 = crate::accel::bvh2::MAX_LEAF;
@@ -99,7 +100,14 @@ fn subtree(items: &mut [Item], heuristic: &Heuristic, depth: u32) -> Subtree {
     };
     let (left, right) = items.split_at_mut(middle);
     let children = if n as usize >= PARALLEL {
-        let (a, b) = rayon::join(|| subtree(left, heuristic, depth + 1), || subtree(right, heuristic, depth + 1));
+        let counted = |items: &mut [Item]| {
+            let subtree = subtree(items, heuristic, depth + 1);
+            if items.len() < PARALLEL {
+                stage::advance(items.len() as u64);
+            }
+            subtree
+        };
+        let (a, b) = rayon::join(|| counted(left), || counted(right));
         [a, b]
     } else {
         [subtree(left, heuristic, depth + 1), subtree(right, heuristic, depth + 1)]

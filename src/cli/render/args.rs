@@ -145,7 +145,7 @@ impl RenderArgs {
 
     /// Checks conditions on more than one option.
     pub fn check(&self) -> Result<()> {
-        self.device.check()?;
+        self.device.check_with_files()?;
         self.settings.check()?;
         let wrong = |text: String| Err(Error::Usage(text));
 

@@ -7,6 +7,7 @@ mod tev;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 pub use args::RenderArgs;
@@ -26,7 +27,7 @@ use crate::renderer::Renderer;
 use crate::renderer::defaults::DefaultsReport;
 use crate::renderer::still::StillExtras;
 use crate::terminal::console::{Console, Failure};
-use crate::terminal::interrupt::{self, ProgressControl, SilentControl};
+use crate::terminal::interrupt::{self, Abandonable, ProgressControl, SilentControl};
 use crate::terminal::progress::Progress;
 
 /// Loads, renders, writes, reports.
@@ -58,6 +59,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
 
     interrupt::install();
     let console = args.verbosity.console();
+    let _abandonable = Abandonable::begin(console.json);
     let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     let about_file = FileWarnings::new(args, &renderer);
@@ -134,6 +136,8 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
     // the scene, and what it makes impossible
     interrupt::install();
     let console = args.verbosity.console();
+    // it outlives the renderer, whose end takes time, too
+    let abandonable = Arc::new(Abandonable::begin(console.json));
     let mut viewer = Viewer::connect(args, console)?;
     let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
@@ -144,7 +148,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
         crate::renderer::still::intervals(&args.settings, &renderer.scene().hints, args.settings.spp(renderer.scene()));
     check_intervals(args, plan.clone(), &intervals, &renderer.scene().report.files)?;
 
-    let mut control = CliControl::new(args, console, &renderer);
+    let mut control = CliControl::new(args, console, &renderer, abandonable.clone());
     let extras = StillExtras {
         keep_rays: args.dump_rays.is_some(),
         aov: args.depth_image.is_some(),
@@ -159,6 +163,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start:
         args.output.iter().try_for_each(|path| partial.save_with(&interval_path(path, partial.samples), &args.files))
     })?;
     drop(control);
+    abandonable.end();
 
     // files, whose time counts
     let write_start = Instant::now();
@@ -198,13 +203,15 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
 
     interrupt::install();
     let console = args.verbosity.console();
+    // it outlives the renderer, whose end takes time, too
+    let abandonable = Arc::new(Abandonable::begin(console.json));
     let mut viewer = Viewer::connect(args, console)?;
     let mut renderer = args.load.open(&args.scene, &args.device, &console)?;
     plan.check_scene(&renderer.scene().report.files)?;
     interrupt::check()?;
 
     // a file for each frame, or one for all
-    let mut control = CliControl::new(args, console, &renderer);
+    let mut control = CliControl::new(args, console, &renderer, abandonable.clone());
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = frames.colour();
     let background = args.settings.backdrop().of_pictures();
@@ -231,6 +238,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], plan: &FilePlan, start
     }
 
     // totals of all frames
+    abandonable.end();
     files.finish()?;
     drop(control);
     let mut report = frames.report();
@@ -308,18 +316,31 @@ struct CliControl {
     progress: ProgressControl,
     console: Console,
     about_file: FileWarnings,
+    /// It ends once there is a partial result that is to be kept.
+    abandonable: Arc<Abandonable>,
 }
 
 impl CliControl {
-    fn new(args: &RenderArgs, console: Console, renderer: &Renderer) -> Self {
+    fn new(args: &RenderArgs, console: Console, renderer: &Renderer, abandonable: Arc<Abandonable>) -> Self {
         let progress = Progress::new("rendering", &console);
         let about_file = FileWarnings::new(args, renderer);
-        Self { progress: ProgressControl { progress, keep_partial: args.keep_partial }, console, about_file }
+        let progress = ProgressControl { progress, keep_partial: args.keep_partial };
+        Self { progress, console, about_file, abandonable }
+    }
+}
+
+impl CliControl {
+    /// Samples are being taken, of which a partial result is to be kept.
+    fn keep_partial(&mut self) {
+        if self.progress.keep_partial {
+            self.abandonable.end();
+        }
     }
 }
 
 impl Control for CliControl {
     fn progress(&mut self, done: u64, total: u64) {
+        self.keep_partial();
         self.progress.progress(done, total);
     }
 
@@ -330,6 +351,7 @@ impl Control for CliControl {
     }
 
     fn should_stop(&mut self) -> Result<bool> {
+        self.keep_partial();
         self.progress.should_stop()
     }
 }

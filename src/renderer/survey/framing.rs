@@ -10,7 +10,7 @@ use super::{Survey, Trace, VisibleSurface, significant};
 use crate::error::{Error, Result};
 use crate::renderer::settings::CameraSettings;
 use crate::scene::camera::ViewHeight;
-use crate::scene::inventory::open_edges;
+use crate::scene::open_edges::open_edges;
 use crate::scene::{Camera, Geometry, Projection, Scene};
 use crate::settings::choices;
 

@@ -26,35 +26,48 @@ const OCTAVES: u32 = 12;
 /// hills.
 const GAIN: f64 = 0.47;
 
-/// One of eight gradients, by a hash of the lattice point.
-fn gradient(seed: u32, x: i64, y: i64, dx: f64, dy: f64) -> f64 {
-    let h = hash_combine(hash_combine(seed, x as u32), y as u32) >> 29;
+/// The product of one of eight gradients, by a hash of the lattice point, with an offset.
+fn gradient(hash: u32, dx: f64, dy: f64) -> f64 {
+    let h = hash >> 29;
     let (a, b) = if h & 4 == 0 { (dx, dy) } else { (dy, dx) };
     // (+-1, +-1/2) and (+-1/2, +-1)
     (if h & 1 == 0 { a } else { -a }) + 0.5 * (if h & 2 == 0 { b } else { -b })
 }
 
-/// Gradient noise in about [-1, 1].
-fn noise(seed: u32, x: f64, y: f64) -> f64 {
-    let (fx, fy) = (x.floor(), y.floor());
-    let (dx, dy) = (x - fx, y - fy);
-    let (ix, iy) = (fx as i64, fy as i64);
-    let fade = |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+/// Adds gradient noise in about [-1, 1], times the amplitude, to the heights of points of one y and
+/// the `x` of each. Neighbours in a cell of the lattice have the hashes of its corners in common.
+fn add_noise(heights: &mut [f64], seed: u32, amplitude: f64, x: impl Fn(usize) -> f64, y: f64) {
+    let (fy, fade) = (y.floor(), |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
+    let (dy, iy, v) = (y - fy, fy as i64, fade(y - fy));
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let corner = |i: i64, j: i64| gradient(seed, ix + i, iy + j, dx - i as f64, dy - j as f64);
-    let (u, v) = (fade(dx), fade(dy));
-    mix(mix(corner(0, 0), corner(1, 0), u), mix(corner(0, 1), corner(1, 1), u), v)
+    let mut cell: Option<(i64, [[u32; 2]; 2])> = None;
+    for (k, height) in heights.iter_mut().enumerate() {
+        let x = x(k);
+        let fx = x.floor();
+        let (dx, ix) = (x - fx, fx as i64);
+        let corners = match cell {
+            Some((known, corners)) if known == ix => corners,
+            _ => [0, 1].map(|i| {
+                let column = hash_combine(seed, (ix + i) as u32);
+                [0, 1].map(|j| hash_combine(column, (iy + j) as u32))
+            }),
+        };
+        cell = Some((ix, corners));
+        let corner = |i: usize, j: usize| gradient(corners[i][j], dx - i as f64, dy - j as f64);
+        let u = fade(dx);
+        *height += amplitude * mix(mix(corner(0, 0), corner(1, 0), u), mix(corner(0, 1), corner(1, 1), u), v);
+    }
 }
 
-/// Height of the landscape `seed` at a point of the unit square.
-fn height(seed: u32, x: f64, y: f64) -> f64 {
-    let (mut sum, mut amplitude, mut frequency) = (0.0, RELIEF, CELLS);
+/// Heights of the landscape `seed` at points of one y and the `x` of each, in the unit square.
+fn heights(seed: u32, count: usize, x: impl Fn(usize) -> f64, y: f64) -> Vec<f64> {
+    let (mut sums, mut amplitude, mut frequency) = (vec![0.0; count], RELIEF, CELLS);
     for octave in 0..OCTAVES {
-        sum += amplitude * noise(hash_combine(seed, octave), x * frequency, y * frequency);
+        add_noise(&mut sums, hash_combine(seed, octave), amplitude, |k| x(k) * frequency, y * frequency);
         amplitude *= GAIN;
         frequency *= 2.0;
     }
-    sum
+    sums
 }
 
 /// `n` triangles (at least 2) over a square of side [`SIDE`] around the origin, y up. Vertices are
@@ -65,13 +78,14 @@ fn mesh(seed: u32, n: u32) -> Geometry {
     let columns = ((n as f64 / 2.0).sqrt().floor() as u32).max(1);
     let rows = n.div_ceil(2 * columns);
     let across = columns + 1;
-    let positions = (0..across * (rows + 1))
-        .into_par_iter()
-        .map(|k| {
-            let (x, z) = ((k % across) as f64 / columns as f64, (k / across) as f64 / rows as f64);
-            DVec3::new((x - 0.5) * SIDE, height(seed, x, z), (z - 0.5) * SIDE).as_vec3()
-        })
-        .collect();
+    let mut positions = vec![Vec3::ZERO; across as usize * (rows as usize + 1)];
+    positions.par_chunks_mut(across as usize).enumerate().for_each(|(row, positions)| {
+        let (x, z) = (|k: usize| k as f64 / columns as f64, row as f64 / rows as f64);
+        let heights = heights(seed, positions.len(), x, z);
+        for (k, (position, height)) in positions.iter_mut().zip(heights).enumerate() {
+            *position = DVec3::new((x(k) - 0.5) * SIDE, height, (z - 0.5) * SIDE).as_vec3();
+        }
+    });
     let indices = (0..n)
         .into_par_iter()
         .map(|t| {
@@ -152,8 +166,8 @@ mod tests {
             (t.positions[0], t.positions[t.positions.len() - 1])
         };
         assert_eq!(at(200), at(20_000));
-        let (lo, hi) = (0..2500)
-            .map(|k| height(1, f64::from(k % 50) / 50.0, f64::from(k / 50) / 50.0))
+        let (lo, hi) = (0..50)
+            .flat_map(|row| heights(1, 50, |k| k as f64 / 50.0, f64::from(row) / 50.0))
             .fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
         assert!(hi - lo > 0.5 * RELIEF && hi - lo < 4.0 * RELIEF, "{lo} {hi}");
     }

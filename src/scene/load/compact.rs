@@ -1,6 +1,13 @@
 //! Removal of unused vertices.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
 use crate::scene::TriangleMesh;
+
+/// Triangles that a thread looks at at least.
+const MIN_LENGTH: usize = 1 << 16;
 
 /// Drops unused vertices where they are more than half. Exporters let many meshes share one large
 /// array, of which each uses a part; whole copies for each would multiply the memory.
@@ -12,23 +19,29 @@ use crate::scene::TriangleMesh;
 pub(super) fn compact(mesh: &mut TriangleMesh) -> Option<Vec<u32>> {
     const UNUSED: u32 = u32::MAX;
     let count = mesh.positions.len();
-    let mut index = vec![UNUSED; count];
-    let mut used = 0;
-    for &i in mesh.indices.iter().flatten() {
-        match index.get_mut(i as usize) {
-            Some(slot) if *slot == UNUSED => {
-                *slot = 0;
-                used += 1;
-            }
-            Some(_) => {}
-            None => return None,
+
+    // which are used
+    let is_used: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
+    let in_range = mesh.indices.par_iter().with_min_len(MIN_LENGTH).flatten_iter().all(|&i| {
+        let Some(used) = is_used.get(i as usize) else { return false };
+        // a store where nothing changes would take the line of the cache from other threads
+        if !used.load(Ordering::Relaxed) {
+            used.store(true, Ordering::Relaxed);
         }
+        true
+    });
+    if !in_range {
+        return None;
     }
+    let used = is_used.iter().filter(|used| used.load(Ordering::Relaxed)).count();
     if used * 2 > count || !mesh.positions.iter().all(|p| p.is_finite()) {
         return None;
     }
+
     // vertices keep their order
-    for (next, slot) in index.iter_mut().filter(|slot| **slot != UNUSED).enumerate() {
+    let mut index = vec![UNUSED; count];
+    for (next, (slot, _)) in index.iter_mut().zip(&is_used).filter(|(_, used)| used.load(Ordering::Relaxed)).enumerate()
+    {
         *slot = next as u32;
     }
     for i in mesh.indices.iter_mut().flatten() {

@@ -14,10 +14,14 @@ use crate::scene::MAX_COORDINATE;
 use crate::scene::animation::{Deformation, renumbered};
 use crate::scene::material::all_variants;
 use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
+use crate::stage;
 
 /// Smallest extent of a scene: below it products of lengths are lost in single precision, those of
 /// drivers' triangle tests first.
 const MIN_EXTENT: f64 = 1e-12;
+
+/// Vertices or triangles that a thread looks at at least.
+const MIN_LENGTH: usize = 1 << 16;
 
 /// Largest element of an inverse transform, for the same reason.
 const MAX_INVERSE: f64 = 1e30;
@@ -25,6 +29,7 @@ const MAX_INVERSE: f64 = 1e30;
 /// Checks and repairs `scene`, which was read from `path`, and gives its meshes the normals and
 /// texture coordinates of `options`.
 pub(super) fn finish(scene: &mut Scene, path: &Path, options: GeometryOptions, budget: &Budget) -> Result<()> {
+    let _stage = stage::begin("checking meshes");
     check(scene, path)?;
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
@@ -87,14 +92,22 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
         }
     };
     let far = |p: &glam::Vec3| f64::from(p.abs().max_element()) > MAX_COORDINATE;
+    let count = triangles.positions.len();
+    let outside = |t: &[u32; 3]| t.iter().any(|&i| i as usize >= count);
+
+    // nearly all are good, and then the first bad one need not be found
+    let positions = triangles.positions.par_iter().with_min_len(MIN_LENGTH);
+    let indices = triangles.indices.par_iter().with_min_len(MIN_LENGTH);
+    if positions.all(|p| p.is_finite() && !far(p)) && !indices.any(outside) {
+        return Ok(());
+    }
     if let Some(i) = triangles.positions.iter().position(|p| !p.is_finite()) {
         return Err(format!("the position of vertex {i} is not finite (NaN or infinite): {REMEDY}"));
     }
     if let Some(i) = triangles.positions.iter().position(far) {
         return Err(format!("the position of vertex {i} is beyond {MAX_COORDINATE:e} units: scale the model down"));
     }
-    let count = triangles.positions.len();
-    if let Some(t) = triangles.indices.iter().position(|t| t.iter().any(|&i| i as usize >= count)) {
+    if let Some(t) = triangles.indices.iter().position(outside) {
         let index = triangles.indices[t].iter().max().copied().unwrap_or(0);
         return Err(format!("triangle {t} refers to vertex {index}, but there are only {count}: {REMEDY}"));
     }
@@ -197,7 +210,9 @@ fn repair(mesh: &mut Mesh, materials: &[&Material], deformation: Option<&mut Def
     let before = triangles.indices.len();
     let positions = &triangles.positions;
     let opens = |t| deformation.as_ref().is_some_and(|d| !d.stays_flat(t, positions));
-    triangles.indices.retain(|&t| !is_degenerate(t, positions) || opens(t));
+    if triangles.indices.par_iter().with_min_len(MIN_LENGTH).any(|&t| is_degenerate(t, positions)) {
+        triangles.indices.retain(|&t| !is_degenerate(t, positions) || opens(t));
+    }
     notes.degenerate = before - triangles.indices.len();
     if triangles.indices.is_empty() {
         return notes;

@@ -1,26 +1,34 @@
 //! Repair of shading normals: unit length, and a direction for zero normals.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::scene::TriangleMesh;
+
+/// Normals that a thread looks at at least.
+const MIN_LENGTH: usize = 1 << 16;
 
 /// Brings all normals to unit length. Those that are zero or not finite become the mean of the
 /// adjacent triangles' normals, weighted by area. Returns how many those were.
 ///
 /// The mesh must have normals, and indices in range.
 pub(super) fn repair(mesh: &mut TriangleMesh) -> usize {
-    let mut bad = 0;
-    for n in &mut mesh.normals {
-        let wide = n.as_dvec3();
-        let squared = wide.length_squared();
-        if !(squared.is_finite() && squared > 0.0) {
-            bad += 1;
-            *n = Vec3::ZERO;
-        } else if (squared - 1.0).abs() > 1e-5 {
-            // normals of unit length up to rounding keep their bits
-            *n = (wide / squared.sqrt()).as_vec3();
-        }
-    }
+    let normals = mesh.normals.par_iter_mut().with_min_len(MIN_LENGTH);
+    let bad = normals
+        .filter_map(|n| {
+            let wide = n.as_dvec3();
+            let squared = wide.length_squared();
+            if !(squared.is_finite() && squared > 0.0) {
+                *n = Vec3::ZERO;
+                return Some(());
+            }
+            if (squared - 1.0).abs() > 1e-5 {
+                // normals of unit length up to rounding keep their bits
+                *n = (wide / squared.sqrt()).as_vec3();
+            }
+            None
+        })
+        .count();
     if bad > 0 {
         from_triangles(mesh);
     }

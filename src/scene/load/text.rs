@@ -166,6 +166,16 @@ pub(super) struct Lines<R> {
     end: usize,
     has_ended: bool,
     joined: Vec<u8>,
+    /// Number of calls of [`Lines::plain`] that find nothing yet.
+    impure: usize,
+}
+
+/// Lines that need no joining, as one text.
+pub(super) struct PlainLines<'a> {
+    /// The lines, each with its end, LF or CR LF.
+    pub text: &'a [u8],
+    /// Number of the last line before them.
+    pub before: usize,
 }
 
 impl Lines<Box<dyn Read>> {
@@ -181,7 +191,16 @@ impl Lines<Box<dyn Read>> {
                 Box::new(Cursor::new(utf8_of(&first[mark..], other == Encoding::Utf16BigEndian)))
             }
         };
-        Ok(Self { reader, number: 0, block: vec![0; BLOCK], start: 0, end: 0, has_ended: false, joined: Vec::new() })
+        Ok(Self {
+            reader,
+            number: 0,
+            block: vec![0; BLOCK],
+            start: 0,
+            end: 0,
+            has_ended: false,
+            joined: Vec::new(),
+            impure: 0,
+        })
     }
 }
 
@@ -206,6 +225,34 @@ impl<R: Read> Lines<R> {
             (from, to) = next;
         }
         Ok(Some(from_bytes(&self.joined)))
+    }
+
+    /// The lines of the next `size` bytes or more at once; `None` if they have to be read one by
+    /// one, because there is a backslash among them, which may join two, a zero or a lone CR, or
+    /// because they are the last.
+    pub(super) fn plain(&mut self, size: usize) -> std::io::Result<Option<PlainLines<'_>>> {
+        if self.impure > 0 {
+            self.impure -= 1;
+            return Ok(None);
+        }
+        while self.end - self.start < size && !self.has_ended {
+            self.read_more()?;
+        }
+        let unread = &self.block[self.start..self.end];
+        let Some(last) = memchr::memrchr(b'\n', unread) else { return Ok(None) };
+        let text = &unread[..=last];
+        let count = memchr::memchr_iter(b'\n', text).count();
+        let is_plain = memchr::memchr2(b'\\', 0, text).is_none()
+            && memchr::memchr_iter(b'\r', text).all(|at| text[at + 1] == b'\n');
+        if !is_plain {
+            self.impure = count;
+            return Ok(None);
+        }
+        let before = self.number;
+        self.number += count;
+        let start = self.start;
+        self.start += last + 1;
+        Ok(Some(PlainLines { text: &self.block[start..=start + last], before }))
     }
 
     /// Where in the block the next line is, which LF, CR LF or CR ends.

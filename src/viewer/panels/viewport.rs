@@ -8,6 +8,7 @@ use egui::{
 use super::hierarchy;
 use super::menu::{self, shortcuts};
 use crate::realtime::Preset;
+use crate::stage;
 use crate::viewer::app::{App, Arrangement};
 use crate::viewer::camera::AxisView;
 use crate::viewer::dialog::Dialog;
@@ -352,7 +353,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
     // the state of loading and rendering, then what failed
     let mut lines: Vec<(String, bool)> = Vec::new();
     let is_loading = app.loading.is_some() || app.control.is_none() && app.source.is_some() && app.failure.is_none();
-    let mut share = None;
+    let (mut share, mut is_waiting) = (None, is_loading);
     if let Some((text, part)) = &app.loading {
         lines.push((format!("{text} …"), false));
         share = *part;
@@ -366,6 +367,17 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
         && app.error(app.shows_second).is_none()
     {
         lines.push(("rendering …".into(), false));
+        is_waiting = true;
+    }
+
+    // a stage of it that takes long, and how much of that is done
+    if let Some(stage) = stage::current().filter(|_| is_waiting) {
+        lines.clear();
+        lines.push(match &app.loading {
+            Some((text, _)) => (format!("{text}: {} …", stage.name), false),
+            None => (format!("{} …", stage.name), false),
+        });
+        share = stage.share.map(|share| share as f32).or(share);
     }
     if app.source.is_none() {
         lines.push((
@@ -383,7 +395,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
     if lines.is_empty() {
         return;
     }
-    if is_loading {
+    if is_waiting {
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
     }
 
@@ -398,7 +410,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
                 ui.set_max_width(width);
                 for (text, is_error) in lines {
                     ui.horizontal_wrapped(|ui| {
-                        if is_loading && !is_error {
+                        if is_waiting && !is_error {
                             ui.spinner();
                         }
                         let text = egui::RichText::new(text);

@@ -5,6 +5,7 @@ mod icon;
 mod vulkan;
 
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use egui_winit::winit::application::ApplicationHandler;
@@ -21,9 +22,16 @@ use super::remembered::Remembered;
 use super::request::{EventSender, Mailbox};
 use super::{Painter, ViewOptions, panels, worker};
 use crate::error::{Error, Result};
+use crate::gpu::threads::end_process;
+use crate::stage;
+use crate::terminal::interrupt;
 
 /// Time after which it is noticed at the latest that the user has interrupted the program.
 const INTERRUPT_INTERVAL: Duration = Duration::from_millis(300);
+/// Time that the thread that renders has to end once the window is closed, if it is in a stage of
+/// long work; and the time between two looks at it.
+const PATIENCE: Duration = Duration::from_millis(300);
+const LOOK: Duration = Duration::from_millis(5);
 /// Smallest size of the window, points.
 const MIN_SIZE: [f64; 2] = [320.0, 240.0];
 
@@ -178,9 +186,26 @@ pub fn run(options: &ViewOptions) -> Result<()> {
     let outcome = show(event_loop, &mut app, window_options);
     app.quit();
     app.remembered.iter().for_each(Remembered::save);
+    wait_for(thread, &outcome);
+    outcome
+}
+
+/// Waits for the thread that renders. Where it is in a stage of long work, such as building a BVH,
+/// which writes nothing and asks nobody, the process ends without it.
+fn wait_for(thread: JoinHandle<()>, outcome: &Result<()>) {
+    let start = Instant::now();
+    while !thread.is_finished() {
+        if start.elapsed() > PATIENCE && stage::current().is_some() {
+            match outcome {
+                Ok(()) => end_process(0),
+                Err(Error::Interrupted) => interrupt::end_interrupted(false),
+                Err(_) => {}
+            }
+        }
+        std::thread::sleep(LOOK);
+    }
     // a panic of it was an event, which the window has shown
     let _ = thread.join();
-    outcome
 }
 
 /// Opens a window on images and returns when it is closed. `size`: in points.
@@ -341,7 +366,7 @@ impl<A: WindowApp> ApplicationHandler<Wake> for Viewer<'_, A> {
     }
 
     fn new_events(&mut self, event_loop: &ActiveEventLoop, cause: StartCause) {
-        if crate::terminal::interrupt::requested() {
+        if interrupt::requested() {
             self.fail(event_loop, Error::Interrupted);
         } else if matches!(cause, StartCause::ResumeTimeReached { .. })
             && self.redraw.is_some_and(|at| at <= Instant::now())

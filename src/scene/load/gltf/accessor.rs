@@ -5,6 +5,7 @@ use std::borrow::Cow;
 
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::{Index, Root, buffer};
+use rayon::prelude::*;
 
 use super::decoded::Decoded;
 use super::values::valid;
@@ -223,11 +224,11 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads an accessor of floats or (normalised) integers with the `N` components of `shape`.
-    pub(super) fn floats<const N: usize, T>(
+    pub(super) fn floats<const N: usize, T: Send>(
         &self,
         index: Index<Accessor>,
         shape: Type,
-        make: impl Fn([f32; N]) -> T,
+        make: impl Fn([f32; N]) -> T + Sync,
     ) -> Result<Vec<T>, String> {
         let accessor = self.accessor(index)?;
         match valid(accessor.type_) {
@@ -240,11 +241,11 @@ impl<'a> Reader<'a> {
         self.try_floats(index, accessor, make).map_err(|e| format!("accessor {index}: {e}"))
     }
 
-    fn try_floats<const N: usize, T>(
+    fn try_floats<const N: usize, T: Send>(
         &self,
         index: Index<Accessor>,
         accessor: &Accessor,
-        make: impl Fn([f32; N]) -> T,
+        make: impl Fn([f32; N]) -> T + Sync,
     ) -> Result<Vec<T>, String> {
         let base = self.base(index, N)?;
         self.take(base.count.saturating_mul(size_of::<T>() as u64), base.count)?;
@@ -346,12 +347,15 @@ fn name(shape: Type) -> String {
     format!("{shape:?}").to_uppercase()
 }
 
-fn gather<const N: usize, T>(
+/// Elements of an accessor that a thread reads at least.
+const MIN_ELEMENTS: usize = 1 << 16;
+
+fn gather<const N: usize, T: Send>(
     elements: &Elements,
     count: usize,
     component: ComponentType,
     normalized: bool,
-    make: impl Fn([f32; N]) -> T,
+    make: impl Fn([f32; N]) -> T + Sync,
 ) -> Vec<T> {
     let size = component.size();
     let element = |i: usize| {
@@ -364,7 +368,7 @@ fn gather<const N: usize, T>(
             let b = &elements.bytes[i * elements.stride..][..N * 4];
             make(std::array::from_fn(|k| ComponentType::F32.float(&b[k * 4..k * 4 + 4], false)))
         };
-        return (0..count).map(element).collect();
+        return (0..count).into_par_iter().with_min_len(MIN_ELEMENTS).map(element).collect();
     }
-    (0..count).map(element).collect()
+    (0..count).into_par_iter().with_min_len(MIN_ELEMENTS).map(element).collect()
 }

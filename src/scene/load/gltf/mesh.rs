@@ -4,6 +4,7 @@ use ::gltf::json::accessor::Type;
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::accessor::{Indices, Reader};
 use super::compressed::{self, DRACO};
@@ -106,11 +107,17 @@ pub(super) fn read(
     Ok(Some(mesh))
 }
 
+/// Triangles of a list that a thread reads at least.
+const MIN_TRIANGLES: usize = 1 << 16;
+
 /// Triangles of a list, strip or fan of `n` corners, all counter-clockwise as the specification
 /// orders them.
-fn triangles(mode: Mode, n: usize, corner: impl Fn(usize) -> u32) -> Vec<[u32; 3]> {
+fn triangles(mode: Mode, n: usize, corner: impl Fn(usize) -> u32 + Sync) -> Vec<[u32; 3]> {
     match mode {
-        Mode::Triangles => (0..n / 3).map(|t| [corner(3 * t), corner(3 * t + 1), corner(3 * t + 2)]).collect(),
+        Mode::Triangles => {
+            let triangle = |t: usize| [corner(3 * t), corner(3 * t + 1), corner(3 * t + 2)];
+            (0..n / 3).into_par_iter().with_min_len(MIN_TRIANGLES).map(triangle).collect()
+        }
         Mode::TriangleStrip => {
             (0..n.saturating_sub(2)).map(|t| [corner(t), corner(t + 1 + t % 2), corner(t + 2 - t % 2)]).collect()
         }

@@ -47,6 +47,7 @@ use super::options::Loading;
 use crate::error::{Error, Result};
 use crate::scene::material::{VariantMaterials, all_variants};
 use crate::scene::{FileExtension, Geometry, Instance, Material, Mesh, MeshSource, Scene};
+use crate::stage;
 
 /// Extensions that skylit reads, and whether this program was built with what they need.
 const KNOWN: &[(&str, bool)] = &[
@@ -85,6 +86,7 @@ const KNOWN: &[(&str, bool)] = &[
 /// Reads a `.gltf` or `.glb` file.
 pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     // the document and its buffers
+    let reading = stage::begin("reading the file");
     let file = crate::files::read_regular(path).map_err(|e| Error::read(path, &e))?;
     let budget = loading.budget;
     budget.read(file.len());
@@ -95,6 +97,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     scene.report.files = container::files(&document, path, loading.options.confine.folder())?;
     let buffers = container::buffers(&document, chunks.bin, path, loading);
     let stored = Reader { document: &document, buffers: &buffers, decoded: &Decoded::default(), budget };
+    drop(reading);
     let decoded = compressed::decode(&stored, loading.options.progress);
     let reader = Reader { decoded: &decoded, ..stored };
     let input = |e| Error::input(path, e);
@@ -119,6 +122,7 @@ pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
     image_light::apply(&reader, path, chosen, loading, &mut scene, &mut |w| warnings.push(w));
 
     // nodes, and what they carry
+    let _stage = stage::begin("reading meshes");
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
     let mut meshes = Meshes {
         reader: &reader,

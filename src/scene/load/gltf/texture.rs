@@ -16,6 +16,7 @@ use super::{container, uri};
 use crate::scene::load::options::{LoadPart, LoadProgress, Loading};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::{Filter, Material, Texture, Wrap};
+use crate::stage;
 
 /// Decodes the images that materials use, and turns the glTF textures in their slots into the
 /// scene's.
@@ -63,8 +64,10 @@ pub(super) fn resolve(
         (options.progress)(LoadProgress { part: LoadPart::Images, done, of: Some(count) });
         (i, decoded)
     };
+    let decoding = stage::begin("decoding images");
     let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
         if options.textures { wanted.into_par_iter().map(decode).collect() } else { BTreeMap::new() };
+    drop(decoding);
     let skipped = if options.textures { 0 } else { count };
 
     // textures of the images that could be decoded

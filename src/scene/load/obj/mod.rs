@@ -14,6 +14,7 @@ mod keys;
 mod material;
 mod mtl;
 mod parse;
+mod plain;
 mod polygon;
 mod smooth;
 mod texture;
@@ -22,10 +23,11 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use keys::PositionKeys;
 use material::MaterialLibrary;
-use parse::{Group, NONE, ObjFile};
+use parse::{Corner, Group, NONE, ObjFile};
 
 use super::find;
 use super::nodes::NodeTreeBuilder;
@@ -33,6 +35,9 @@ use super::options::{Loading, NormalSource};
 use super::text::{self, unquoted, without_comment};
 use crate::error::Result;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh, distant_centre};
+
+/// Triangles that a thread looks at at least.
+const MIN_TRIANGLES: usize = 1 << 14;
 
 /// Reads an `.obj` file and the material libraries that it names.
 pub(super) fn read(path: &Path, loading: Loading) -> Result<Scene> {
@@ -254,19 +259,25 @@ fn word_ranges(text: &str) -> Vec<(usize, usize)> {
 /// origin for its size, so that single precision is spent on the model. It is the same for all
 /// meshes: those that share a vertex still do.
 fn origin(file: &ObjFile) -> DVec3 {
-    let used =
-        file.groups.iter().flat_map(|g| g.triangles.iter().flatten()).map(|c| file.positions[c.position as usize]);
-    let bounds = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let none = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let add = |(lo, hi): (DVec3, DVec3), triangle: &[Corner; 3]| {
+        let [a, b, c] = triangle.map(|corner| file.positions[corner.position as usize]);
+        (lo.min(a).min(b).min(c), hi.max(a).max(b).max(c))
+    };
+    let union = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+    let of_group = |g: &Group| g.triangles.par_iter().with_min_len(MIN_TRIANGLES).fold(none, add).reduce(none, union);
+    let bounds = file.groups.iter().map(of_group).fold(none(), union);
     if bounds.0.x <= bounds.1.x { distant_centre(bounds.0, bounds.1) } else { DVec3::ZERO }
 }
 
 /// Makes one vertex of each combination of position, texture coordinate and normal in a mesh.
 fn weld(file: &ObjFile, group: &Group, origin: DVec3, keys: &mut PositionKeys) -> TriangleMesh {
     keys.clear();
-    let corners = || group.triangles.iter().flatten();
-    let with_normals = corners().any(|c| c.normal != NONE);
-    let with_texcoords = corners().any(|c| c.texcoord != NONE);
-    let mut mesh = TriangleMesh::default();
+    let any = |has: fn(&Corner) -> bool| {
+        group.triangles.par_iter().with_min_len(MIN_TRIANGLES).any(|triangle| triangle.iter().any(has))
+    };
+    let (with_normals, with_texcoords) = (any(|c| c.normal != NONE), any(|c| c.texcoord != NONE));
+    let mut mesh = TriangleMesh { indices: Vec::with_capacity(group.triangles.len()), ..TriangleMesh::default() };
     for triangle in &group.triangles {
         let indices = triangle.map(|corner| {
             let index = keys.index(corner.position, [corner.texcoord, corner.normal]);
