@@ -36,6 +36,10 @@ book:
 reference:
     cargo run --locked -- man docs/reference/commands --format markdown
 
+# the program for Windows, tried under Wine
+windows:
+    ./scripts/windows.sh check
+
 # a kit for a machine with a GPU
 gpu:
     ./scripts/gpu.sh

@@ -465,7 +465,7 @@ pub fn portable_name(name: &str) -> String {
 }
 
 /// Variables that name folders of the user.
-const FOLDER_VARIABLES: [&str; 3] = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"];
+const FOLDER_VARIABLES: [&str; 5] = ["HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "LOCALAPPDATA", "APPDATA"];
 
 /// The folder that a variable names; `None` for one that is not set, empty or relative. The XDG
 /// Base Directory Specification says to ignore relative paths, which would put files into whatever
@@ -485,16 +485,23 @@ pub fn ignored_user_folders() -> Vec<(&'static str, PathBuf)> {
         .collect()
 }
 
-/// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either
-/// variable.
-pub fn cache_folder() -> Option<PathBuf> {
-    user_folder("XDG_CACHE_HOME").or_else(|| Some(user_folder("HOME")?.join(".cache"))).map(|p| p.join("skylit"))
+/// The folder of this program below that of a variable, or else below the system's: on Windows that
+/// of the variable `windows`, elsewhere `below` the user's home. `None` where no variable is set.
+fn own_folder(variable: &str, windows: &str, below: &str) -> Option<PathBuf> {
+    let of_system = || if cfg!(windows) { user_folder(windows) } else { Some(user_folder("HOME")?.join(below)) };
+    user_folder(variable).or_else(of_system).map(|folder| folder.join("skylit"))
 }
 
-/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, or `~/.config/skylit`; `None` without either
-/// variable.
+/// The cache folder: `$XDG_CACHE_HOME/skylit`, else `~/.cache/skylit` or, on Windows,
+/// `%LOCALAPPDATA%\skylit`; `None` without these variables.
+pub fn cache_folder() -> Option<PathBuf> {
+    own_folder("XDG_CACHE_HOME", "LOCALAPPDATA", ".cache")
+}
+
+/// The folder of settings: `$XDG_CONFIG_HOME/skylit`, else `~/.config/skylit` or, on Windows,
+/// `%APPDATA%\skylit`; `None` without these variables.
 pub fn config_folder() -> Option<PathBuf> {
-    user_folder("XDG_CONFIG_HOME").or_else(|| Some(user_folder("HOME")?.join(".config"))).map(|p| p.join("skylit"))
+    own_folder("XDG_CONFIG_HOME", "APPDATA", ".config")
 }
 
 #[cfg(test)]

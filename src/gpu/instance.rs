@@ -10,6 +10,35 @@ use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
+/// The loader of this system.
+const LOADER: Loader = if cfg!(windows) {
+    Loader {
+        file: "vulkan-1.dll",
+        install: "install the driver of your graphics card, which brings it",
+        renew: "install a newer driver of your graphics card",
+    }
+} else if cfg!(target_os = "macos") {
+    Loader {
+        file: "libvulkan.dylib",
+        install: "install the Vulkan SDK, which has MoltenVK",
+        renew: "install a newer Vulkan SDK",
+    }
+} else {
+    Loader {
+        file: "libvulkan.so.1",
+        install: "run ./scripts/setup.sh or install libvulkan1",
+        renew: "install a newer libvulkan1",
+    }
+};
+
+/// The Vulkan loader of a system.
+struct Loader {
+    file: &'static str,
+    /// The remedy where there is none, and where it is too old.
+    install: &'static str,
+    renew: &'static str,
+}
+
 /// Messages of the validation layer, kept so that one of them can fail a run.
 #[derive(Default)]
 pub(super) struct ValidationLog(Mutex<Vec<String>>);
@@ -68,9 +97,7 @@ impl Instance {
 
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-            Error::Device(format!(
-                "no Vulkan loader (libvulkan.so.1) on this machine: run ./scripts/setup.sh or install libvulkan1 ({e})"
-            ))
+            Error::Device(format!("no Vulkan loader ({}) on this machine: {} ({e})", LOADER.file, LOADER.install))
         })?;
 
         // the loader may be older than the version that skylit needs
@@ -80,9 +107,10 @@ impl Instance {
             .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             return Err(Error::Device(format!(
-                "the Vulkan loader is for version {}.{}, skylit needs 1.3: install a newer libvulkan1",
+                "the Vulkan loader is for version {}.{}, skylit needs 1.3: {}",
                 vk::api_version_major(version),
-                vk::api_version_minor(version)
+                vk::api_version_minor(version),
+                LOADER.renew
             )));
         }
 

@@ -249,16 +249,6 @@ impl Renderer {
         frames.image(control)
     }
 
-    /// Returns true if images of these settings show an environment, or a light infinitely far
-    /// away, where no surface is: then they have no background of their own.
-    ///
-    /// # Errors
-    /// Those of lights and environments that cannot be read.
-    pub fn shows_environment(&mut self, settings: &RenderSettings) -> Result<bool> {
-        self.light(&settings.lighting)?;
-        Ok(settings.integrator().get().shows_environment(&self.scene))
-    }
-
     /// Keeps all live pipelines, and saves the driver's pipeline cache to disk.
     fn keep_pipelines(&mut self) {
         self.pipelines = self.device.live_pipelines();

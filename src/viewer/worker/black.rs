@@ -73,7 +73,8 @@ pub fn reason(
     let is_occlusion = capabilities.contains(&Capability::AmbientOcclusion);
     let radius = settings.integrators.ao.radius();
     let text = match () {
-        () if seen.hits == 0.0 => {
+        // so few pixels make no image that counts as bright
+        () if seen.hits <= 1.0 / BRIGHT as f64 => {
             "Black: nothing of the scene is in view, or too little of it to be seen. F frames it".to_owned()
         }
         () if shows_buffer => return Ok(None),
