@@ -183,6 +183,8 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     panic::install();
     // before other threads start, which inherit it
     interrupt::block_file_size_signal();
+
+    // the command
     let outcome = panic::catch(|| {
         if let Some(text) = help::all(&arguments) {
             return console::print(&text).map_err(Failure::from);
@@ -202,6 +204,8 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
             Err(e) => explain(&e).map_err(Failure::from),
         }
     });
+
+    // what failed, and the exit code
     let (message, code, reported) = match outcome {
         Ok(Ok(())) => return ExitCode::SUCCESS,
         Ok(Err(Failure { error, reported })) => (one_line(&error.to_string()), error.exit_code(), reported),
@@ -224,8 +228,10 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
 fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     #[cfg(feature = "viewer")]
     {
+        // other systems have one always
+        let is_set = |v: &&str| std::env::var_os(v).is_some_and(|v| !v.is_empty());
         let has_display =
-            || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|v| !v.is_empty()));
+            || cfg!(any(windows, target_os = "macos")) || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(is_set);
         let is_view = match arguments.get(1).map(|a| a.to_string_lossy()) {
             None => has_display(),
             Some(first) => !first.starts_with('-') && view::is_file(&first),
