@@ -58,8 +58,13 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         explanations.push(format!("camera rays are shared by {} samples of their pixel", options.rays));
     }
     let all = result.occlusion_rays + result.skipped_rays;
+    // a sample of an open ground counts as one whose camera ray missed
+    let why = match options.catcher {
+        None => "not traced: their camera ray missed",
+        Some(_) => "not traced, or of the open ground: they show what is behind the scene",
+    };
     explanations.push(format!(
-        "{} of {all} occlusion rays ({:.1} %) not traced: their camera ray missed",
+        "{} of {all} occlusion rays ({:.1} %) {why}",
         result.skipped_rays,
         100.0 * result.skipped_rays as f64 / all.max(1) as f64
     ));
