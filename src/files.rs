@@ -15,7 +15,7 @@ use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result, is_out_of_descriptors};
+use crate::error::{Error, Result};
 use crate::memory;
 
 /// Most bytes of a text that people write: settings, manifests, scripts.
@@ -279,7 +279,7 @@ impl Temporary {
             match opened {
                 Ok(file) => return Ok(Self::Unnamed(file)),
                 // what makes the file with a name has no error that says so
-                Err(e) if is_out_of_descriptors(&e) => return Err(e),
+                Err(e) if crate::error::is_out_of_descriptors(&e) => return Err(e),
                 Err(_) => {}
             }
         }
