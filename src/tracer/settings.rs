@@ -9,6 +9,7 @@ use crate::accel::cache::Cache;
 use crate::accel::lab::influence::Placement;
 use crate::accel::lab::{Builder, HeuristicChoice, RayDistribution};
 use crate::error::{Error, Result};
+#[cfg(feature = "cli")]
 use crate::settings::parse::parse_vector;
 use crate::settings::{AppliesTo, choices, settings};
 use crate::tracer::{BuildOptions, ComputeOptions, Kernel, LocalOptions, TracerKind, TriangleTest};
