@@ -28,13 +28,13 @@ pub struct BakePreview {
     render: Vec<String>,
     /// The picture.
     picture: PathBuf,
-    stage: Stage,
+    stage: PreviewStage,
     /// Where the model and the picture are until the preview is closed.
     folder: Option<tempfile::TempDir>,
 }
 
 /// How far a preview is.
-enum Stage {
+enum PreviewStage {
     /// The model is baked.
     Baking(Render),
     /// The picture is rendered.
@@ -68,25 +68,25 @@ impl BakePreview {
         let [model, picture] = ["preview.glb", "preview.png"].map(|name| folder.path().join(name));
         let names = [&model, &picture].map(|path| path.to_string_lossy().into_owned());
         let [bake, render] = arguments(&names[0], &names[1]);
-        let stage = Stage::Baking(Render::start(&program, "bake", &bake, &names[0])?);
+        let stage = PreviewStage::Baking(Render::start(&program, "bake", &bake, &names[0])?);
         Ok(Self { wanted: wanted.clone(), program, render, picture, stage, folder: Some(folder) })
     }
 
     /// Looks at the program that runs, and starts the next one when it has ended.
     pub fn watch(&mut self, context: &egui::Context) {
-        let (Stage::Baking(running) | Stage::Rendering(running)) = &mut self.stage else { return };
+        let (PreviewStage::Baking(running) | PreviewStage::Rendering(running)) = &mut self.stage else { return };
         let Some((said, _)) = running.ended() else {
             context.request_repaint_after(POLL);
             return;
         };
         let has_succeeded = running.has_succeeded();
         self.stage = match &self.stage {
-            _ if !has_succeeded => Stage::Failed(said),
-            Stage::Baking(_) => {
+            _ if !has_succeeded => PreviewStage::Failed(said),
+            PreviewStage::Baking(_) => {
                 let output = self.picture.to_string_lossy();
                 match Render::start(&self.program, "render", &self.render, &output) {
-                    Ok(render) => Stage::Rendering(render),
-                    Err(e) => Stage::Failed(format!("cannot start skylit render: {e}")),
+                    Ok(render) => PreviewStage::Rendering(render),
+                    Err(e) => PreviewStage::Failed(format!("cannot start skylit render: {e}")),
                 }
             }
             _ => self.load(context),
@@ -95,35 +95,35 @@ impl BakePreview {
     }
 
     /// Reads the picture.
-    fn load(&self, context: &egui::Context) -> Stage {
+    fn load(&self, context: &egui::Context) -> PreviewStage {
         match image::open(&self.picture) {
             Ok(picture) => {
                 let picture = picture.into_rgba8();
                 let size = [picture.width() as usize, picture.height() as usize];
                 let pixels = egui::ColorImage::from_rgba_unmultiplied(size, picture.as_raw());
-                Stage::Shown(context.load_texture("bake preview", pixels, egui::TextureOptions::LINEAR))
+                PreviewStage::Shown(context.load_texture("bake preview", pixels, egui::TextureOptions::LINEAR))
             }
-            Err(e) => Stage::Failed(format!("the picture cannot be read: {e}")),
+            Err(e) => PreviewStage::Failed(format!("the picture cannot be read: {e}")),
         }
     }
 
     /// Returns what the dialog shows of it.
     pub fn shown(&self) -> Shown<'_> {
         match &self.stage {
-            Stage::Baking(running) | Stage::Rendering(running) => {
+            PreviewStage::Baking(running) | PreviewStage::Rendering(running) => {
                 let share = running.progress().map(|(share, _)| format!(" {:.0} %", 100.0 * share));
                 Shown::Progress(format!("{}{}", running.verbs()[0], share.unwrap_or_default()))
             }
-            Stage::Shown(picture) => Shown::Picture(picture),
-            Stage::Failed(said) => Shown::Failure(said),
+            PreviewStage::Shown(picture) => Shown::Picture(picture),
+            PreviewStage::Failed(said) => Shown::Failure(said),
         }
     }
 }
 
 impl Drop for BakePreview {
     fn drop(&mut self) {
-        let stage = std::mem::replace(&mut self.stage, Stage::Failed(String::new()));
-        if let Stage::Baking(mut running) | Stage::Rendering(mut running) = stage {
+        let stage = std::mem::replace(&mut self.stage, PreviewStage::Failed(String::new()));
+        if let PreviewStage::Baking(mut running) | PreviewStage::Rendering(mut running) = stage {
             running.cancel();
             // its folder is removed when nothing is written into it any more
             let folder = self.folder.take();
