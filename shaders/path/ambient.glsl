@@ -5,10 +5,10 @@
 #include "path/view.glsl"
 
 // Share of ambient light that a surface reflects: its albedo, less the share that it transmits. What reflects and transmits by delta lobes alone shows single
-// directions, of which ambient occlusion says nothing: 0.
-vec3 ambient_reflectance(Surface s, Shading m, float log_side) {
+// directions, of which ambient occlusion says nothing: 0. albedo: surface_albedo().
+vec3 ambient_reflectance(Shading m, vec3 albedo) {
     if (!has_rough_part(m.bsdf)) return vec3(0.0);
-    return max(surface_albedo(s, log_side) * (1.0 - m.bsdf.through_share) - m.bsdf.transmitted, vec3(0.0));
+    return max(albedo * (1.0 - m.bsdf.through_share) - m.bsdf.transmitted, vec3(0.0));
 }
 
 // The occlusion ray of a sample (ao/sample.glsl), of random length: any hit will do.

@@ -43,8 +43,6 @@ vec3 behind_catcher(PathParams p, PathState state, vec3 w) {
 // k: the path, whose camera ray of direction w has met the ground.
 void catch_shadow(BlockParams block, PathParams p, uint k, PathState state, Surface s, vec3 w, uvec2 pixel, uint n, uint dimension) {
     Shading m = grey_shading(s, -w, 1.0);
-    vec3 wo = to_frame(m.frame, -w);
-    wo.z = max(wo.z, MIN_COSINE);
     Caught caught = Caught(no_ray(), 0.0, sample_2d(block.seed, pixel, n, dimension + BSDF_LOBE).x);
     if (WITH_AMBIENT) add_candidate(caught, p.ambient_color, ambient_ray(block, p.occlusion, s, m.ng, pixel, n));
     if (WITH_LIGHT_SAMPLES) {
@@ -63,7 +61,8 @@ void catch_shadow(BlockParams block, PathParams p, uint k, PathState state, Surf
                     r.direction = to / d;
                     r.tmax = d * (1.0 - SHADOW_EPSILON);
                 }
-                add_candidate(caught, vertex_at(m, wo, l.wi).f * l.radiance / l.pdf, r);
+                // a diffuse surface, written out: the code of all BSDFs is large
+                add_candidate(caught, max(dot(m.frame.n, l.wi), 0.0) / PI * l.radiance / l.pdf, r);
             }
         }
     }

@@ -103,9 +103,9 @@ vec3 transmittance(uint medium, float length_) {
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
 }
 
-// Ambient light at the first surface of a path: the ray whose length is the distance up to which this sample counts hits, and its contribution.
-void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, float log_side, uvec2 pixel, uint n) {
-    vec3 c = state.throughput * p.ambient_color * ambient_reflectance(s, m, log_side);
+// Ambient light at the first surface of a path: the ray whose length is the distance up to which this sample counts hits, and its contribution. albedo: surface_albedo().
+void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 albedo, uvec2 pixel, uint n) {
+    vec3 c = state.throughput * p.ambient_color * ambient_reflectance(m, albedo);
     bool is_needed = highest(c) > 0.0;
     if (!is_needed && !WITH_OCCLUDED_LIGHT) return;
     // where nothing is to be darkened, as on mirrors, a ray that meets nothing
@@ -117,8 +117,8 @@ void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state,
     // the ray is counted where all light is darkened by what it meets (occluded_share)
     store_quad(p.ambient_contributions, slot, vec4(c, WITH_OCCLUDED_LIGHT ? 1.0 : 0.0));
     if (WITH_SIGNAL) {
-        vec3 albedo = v.is_apart ? m.bsdf.diffuse : vec3(0.0);
-        store_quad(p.ambient_diffuse_contributions, slot, vec4(mix(c / albedo, vec3(0.0), equal(albedo, vec3(0.0))), 0.0));
+        vec3 apart = v.is_apart ? m.bsdf.diffuse : vec3(0.0);
+        store_quad(p.ambient_diffuse_contributions, slot, vec4(mix(c / apart, vec3(0.0), equal(apart, vec3(0.0))), 0.0));
     }
 }
 
@@ -270,7 +270,10 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     bool is_given = WITH_SURFACE_POINTS && state.depth + state.passes == 0u;
     if (WITH_CONSTANT_ALBEDO || is_given) m = grey_shading(s, towards_viewer, WITH_CONSTANT_ALBEDO ? p.albedo : 1.0);
     else m = shade(s, towards_viewer, log_side);
-    if (WITH_VIEW) return view_value(p.view, s, m, hit.t + clipped_length(block, ray.direction), log_side);
+    // of views and of ambient light, in one place: drivers compile a copy of the look-up for each
+    vec3 albedo = vec3(0.0);
+    if (WITH_VIEW || WITH_AMBIENT && state.depth == 0u) albedo = surface_albedo(s, log_side);
+    if (WITH_VIEW) return view_value(p.view, s, m, hit.t + clipped_length(block, ray.direction), log_side, albedo);
     vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {
         float light = 0.0;
@@ -312,7 +315,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     if (m.bsdf.kind == BSDF_NONE) return added;
     SignalVertex v = SignalVertex(SIGNAL_SEEN, false, vec3(0.0));
     if (WITH_SIGNAL) v = signal_vertex(p, k, state.depth + state.passes == 0u, m);
-    if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, v, s, m, log_side, pixel, n);
+    if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, v, s, m, albedo, pixel, n);
     if (state.depth >= p.max_depth) {
         // walls that light goes straight through are no bounces
         if (WITH_CLEAR_WALLS) {

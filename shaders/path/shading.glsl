@@ -25,33 +25,42 @@ float texcoord_area(SubmeshRecord submesh, uvec3 corners, uint set) {
     return abs(edge1.x * edge2.y - edge1.y * edge2.x);
 }
 
-// Value of a texture of a kind (TEXELS_*) at a point of a primitive (index in the BLAS), 1 without a texture. uv: barycentrics, or texture coordinates of a sphere.
-// log_side: footprint().
+// Texture coordinates of a use of a texture at a point of a primitive (index in the BLAS). uv: barycentrics, or texture coordinates of a sphere.
+vec2 coordinates_of_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv) {
+    if (!is_null(submesh.indices)) uv = texcoord_at(submesh, triangle_indices(submesh, primitive), uv, use.set);
+    return transform_texcoord(use.transform, use.offset, uv);
+}
+
+// Has a submesh texture coordinates at all?
+bool has_coordinates(SubmeshRecord submesh) { return !is_null(submesh.indices) || HAS_SPHERES && submesh.texcoord_sets != 0u; }
+
+// log2 of the side of a footprint() on the texture of a use, in texels; SHARP for a point of it. Spheres have no footprint.
+float side_on_texture(TextureUse use, SubmeshRecord submesh, uint primitive, float log_side) {
+    if (!HAS_RAY_CONES || !(log_side > SHARP) || is_null(submesh.indices)) return SHARP;
+    TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
+    float area = texcoord_area(submesh, triangle_indices(submesh, primitive), use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
+    area *= float(records.v[use.texture].width) * float(records.v[use.texture].height);
+    // coordinates that do not change show one point of the texture
+    return area > 0.0 ? log_side + 0.5 * log2(area) : SHARP;
+}
+
+// Value of a texture of a kind (TEXELS_*) at a point of a primitive, 1 without a texture; as above, log_side: footprint().
 vec4 sample_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv, uint kind, float log_side) {
-    if (use.texture == INVALID) return vec4(1.0);
-    if (is_null(submesh.indices)) {
-        // without levels: the footprint is one of triangles
-        if (!HAS_SPHERES || submesh.texcoord_sets == 0u) return vec4(1.0);
-        return sample_texture(use.texture, transform_texcoord(use.transform, use.offset, uv), kind != TEXELS_LINEAR);
-    }
-    uvec3 corners = triangle_indices(submesh, primitive);
-    vec2 st = transform_texcoord(use.transform, use.offset, texcoord_at(submesh, corners, uv, use.set));
-    if (HAS_RAY_CONES && log_side > SHARP) {
-        TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
-        float area = texcoord_area(submesh, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
-        area *= float(records.v[use.texture].width) * float(records.v[use.texture].height);
-        // coordinates that do not change show one point of the texture
-        if (area > 0.0) return sample_mipmap(use.texture, st, kind, log_side + 0.5 * log2(area));
-    }
-    return sample_texture(use.texture, st, kind != TEXELS_LINEAR);
+    if (use.texture == INVALID || !has_coordinates(submesh)) return vec4(1.0);
+    return sample_mipmap(use.texture, coordinates_of_use(use, submesh, primitive, uv), kind, side_on_texture(use, submesh, primitive, log_side));
+}
+
+// The same of an sRGB texture, unfiltered: texture filtering applies to hits of paths only.
+vec4 sample_use_sharply(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv) {
+    if (use.texture == INVALID || !has_coordinates(submesh)) return vec4(1.0);
+    return sample_texture(use.texture, coordinates_of_use(use, submesh, primitive, uv), true);
 }
 
 // Linear base colour of a surface.
 vec3 shown_color(Surface s, SubmeshRecord submesh, MaterialRecord m, float log_side) {
-    if (!HAS_BASE_COLORS) return m.base_color.rgb;
-    if (!HAS_RAY_CONES || is_null(submesh.indices)) return base_color(submesh, m, s.primitive, s.uv).rgb;
     vec3 color = m.base_color.rgb;
-    color *= vertex_color(submesh, triangle_indices(submesh, s.primitive), s.uv).rgb;
+    if (!HAS_BASE_COLORS) return color;
+    if (!is_null(submesh.indices)) color *= vertex_color(submesh, triangle_indices(submesh, s.primitive), s.uv).rgb;
     TextureUse use = TextureUse(m.texcoord_transform, m.texcoord_offset, m.base_color_texture, m.texcoord_set);
     // with alpha, colours are premultiplied: texels of alpha 0 do not contribute
     return color * sample_use(use, submesh, s.primitive, s.uv, m.alpha_cutoff < 0.0 ? TEXELS_SRGB : TEXELS_COVERED, log_side).rgb;
@@ -63,8 +72,7 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     SubmeshRecord submesh = load_submesh_record(root.submeshes, Pairs(root.scene_instances).v[instance].y);
     TextureUse use = SHADING_OF(submesh.material).uses[USE_EMISSION];
-    // unfiltered: texture filtering applies to hits of paths only
-    return sample_use(use, submesh, primitive + submesh.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
+    return sample_use_sharply(use, submesh, primitive + submesh.first_primitive, uv).rgb;
 }
 
 // The same of a point of a sphere with this unit normal in the world.
@@ -75,7 +83,7 @@ vec3 sphere_emission_texture(uint instance, vec3 normal) {
     SubmeshRecord submesh = load_submesh_record(root.submeshes, records.y);
     if (submesh.texcoord_sets == 0u) return vec3(1.0);
     if (!SINGLE_LEVEL) normal = normalize(transform_vector(InstanceRecords(root.instances).v[records.x].world_to_group, normal));
-    return sample_use(SHADING_OF(submesh.material).uses[USE_EMISSION], submesh, submesh.first_primitive, sphere_texcoord(normal), TEXELS_SRGB, SHARP).rgb;
+    return sample_use_sharply(SHADING_OF(submesh.material).uses[USE_EMISSION], submesh, submesh.first_primitive, sphere_texcoord(normal)).rgb;
 }
 
 // Alpha of an emitter at a point of a primitive of an instance of the scene: the fraction of rays that hit it there.

@@ -21,11 +21,12 @@ float baked_visibility(Surface s, float log_side) {
     return 1.0 + SHADING_OF(submesh.material).occlusion_strength * (visibility - 1.0);
 }
 
-vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {
+// albedo: surface_albedo().
+vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side, vec3 albedo) {
     if (view == VIEW_DEPTH) return vec3(distance_);
     if (view == VIEW_NORMALS) return shown.frame.n;
     if (view == VIEW_BAKED_OCCLUSION) return vec3(baked_visibility(s, log_side));
-    return surface_albedo(s, log_side);
+    return albedo;
 }
 
 #endif

@@ -35,20 +35,18 @@ vec2 transform_texcoord(vec4 m, vec2 offset, vec2 st) { return vec2(m.x * st.x +
 // everywhere.
 vec4 base_color(SubmeshRecord submesh, MaterialRecord material, uint primitive, vec2 uv) {
     vec4 color = material.base_color;
-    if (is_null(submesh.indices)) {
-        if (HAS_SPHERES && submesh.texcoord_sets != 0u && material.base_color_texture != INVALID) {
-            vec2 st = transform_texcoord(material.texcoord_transform, material.texcoord_offset, uv);
-            color.rgb *= sample_texture(material.base_color_texture, st, true).rgb;
-        }
-        return color;
+    bool is_sphere = is_null(submesh.indices);
+    if (is_sphere && !(HAS_SPHERES && submesh.texcoord_sets != 0u)) return color;
+    vec2 st = uv;
+    if (!is_sphere) {
+        uvec3 corners = triangle_indices(submesh, primitive);
+        color *= vertex_color(submesh, corners, uv);
+        if (material.base_color_texture != INVALID) st = texcoord_at(submesh, corners, uv, material.texcoord_set);
     }
-    uvec3 corners = triangle_indices(submesh, primitive);
-    color *= vertex_color(submesh, corners, uv);
-    if (material.base_color_texture != INVALID) {
-        vec2 st = transform_texcoord(material.texcoord_transform, material.texcoord_offset, texcoord_at(submesh, corners, uv, material.texcoord_set));
-        color *= sample_texture(material.base_color_texture, st, true);
-    }
-    return color;
+    if (material.base_color_texture == INVALID) return color;
+    // in one place: drivers compile a copy of the look-up for each
+    vec4 found = sample_texture(material.base_color_texture, transform_texcoord(material.texcoord_transform, material.texcoord_offset, st), true);
+    return color * vec4(found.rgb, is_sphere ? 1.0 : found.a);
 }
 
 // A uniform random number in [0, 1) for a ray and a primitive, the same in every call. Rays without a seed are distinguished by the bits of their barycentrics

@@ -2,6 +2,7 @@
 // itself (scene/texture.glsl); the others are linear, 16 bits per channel, or floats for textures of more than 8 bits.
 #ifndef SCENE_MIPMAP
 #define SCENE_MIPMAP
+#include "interface/material_features.glsl"
 #include "interface/texels.glsl"
 #include "scene/texture.glsl"
 
@@ -35,7 +36,7 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
 vec4 sample_mipmap(uint index, vec2 uv, uint kind, float lod) {
     MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
     // also for NaN
-    bool plain = !(lod > 0.0) || mips.v[index].last == 0u;
+    bool plain = !HAS_RAY_CONES || !(lod > 0.0) || mips.v[index].last == 0u;
     if (!plain) {
         TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
         float whole = min(lod, float(mips.v[index].last));
