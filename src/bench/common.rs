@@ -159,37 +159,26 @@ pub struct JsonRecord<'a> {
 }
 
 impl CommonArgs {
-    /// Checks the arguments before anything that takes long, and makes the report's folder.
-    pub fn check(&self) -> Result<FilePlan> {
-        let mut plan = self.plan();
-        plan.check()?;
-        self.outputs.check_writable(&mut plan)?;
-        self.csv.as_deref().map_or(Ok(()), files::check_writable)?;
-        Ok(plan)
-    }
-
-    /// Checks that no output replaces a scene, its files, the environment, or the list of peers.
+    /// Checks before anything that takes long that outputs can be written, and that none replaces a
+    /// scene, its files, the environment, or the list of peers. Makes the report's folder.
     ///
     /// # Errors
     /// [`Error::Usage`], naming both files; errors of scenes, read where files may be replaced.
-    pub fn check_inputs(&self, scenes: &[String], environment: Option<&Path>, peers: Option<&str>) -> Result<()> {
-        let mut plan = self.plan();
+    pub fn check(&self, scenes: &[String], environment: Option<&Path>, peers: Option<&str>) -> Result<FilePlan> {
+        let mut plan = self.outputs.plan();
+        self.csv.iter().for_each(|path| plan.writes("--csv", path));
+        self.baseline.iter().for_each(|path| plan.reads("--baseline", path));
         scenes.iter().for_each(|scene| plan.reads("the scene", scene));
         environment.iter().for_each(|path| plan.reads_images("--environment", path));
         peers.iter().for_each(|path| plan.reads("--peers", path));
         plan.check()?;
-        if !plan.replaces_files() {
-            return Ok(());
+        if plan.replaces_files() {
+            let mut files = scenes.iter().filter(|scene| Path::new(scene).is_file());
+            files.try_for_each(|scene| plan.check_scene(&load::files_of(scene)?))?;
         }
-        let mut files = scenes.iter().filter(|scene| Path::new(scene).is_file());
-        files.try_for_each(|scene| plan.check_scene(&load::files_of(scene)?))
-    }
-
-    fn plan(&self) -> FilePlan {
-        let mut plan = self.outputs.plan();
-        self.csv.iter().for_each(|path| plan.writes("--csv", path));
-        self.baseline.iter().for_each(|path| plan.reads("--baseline", path));
-        plan
+        self.outputs.check_writable(&mut plan)?;
+        self.csv.as_deref().map_or(Ok(()), files::check_writable)?;
+        Ok(plan)
     }
 
     /// Writes the JSON record and the CSV table if requested, each even if the other fails.
@@ -206,7 +195,7 @@ impl CommonArgs {
     }
 
     /// The `given` value, or the default, or with `--quick` the `quick` default.
-    pub fn setting<T>(&self, given: Option<T>, default: T, quick: T) -> T {
+    pub fn setting<T>(&self, given: Option<T>, [default, quick]: [T; 2]) -> T {
         given.unwrap_or(if self.quick { quick } else { default })
     }
 }

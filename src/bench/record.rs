@@ -11,6 +11,7 @@ pub(super) use super::quantity;
 pub use super::quantity::{Better, Quantity, plain};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::gpu::DeviceInfo;
 use crate::measure::displayed::ImageErrors;
 use crate::measure::regression::Values;
 use crate::measure::stats::Percentiles;
@@ -53,11 +54,32 @@ pub struct HostInfo {
 }
 
 impl HostInfo {
+    /// This host, with a device of it.
+    pub fn new(device: &DeviceInfo) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            device: device.name.clone(),
+            driver: device.driver.clone(),
+            cpu: cpu_name(),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+
     /// The host in a line, as plots and pages have it.
     pub fn line(&self) -> String {
         let cpu = if self.cpu.is_empty() { String::new() } else { format!("{}, ", self.cpu) };
         format!("{} ({}), {cpu}{} threads", self.device, self.driver, self.threads)
     }
+}
+
+/// Name of the host's processor, as the kernel says it; empty where it does not.
+fn cpu_name() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    // "model name" on x86; boards with other processors say "Hardware" or "Model" at best
+    let value = |key: &str| {
+        text.lines().filter_map(|l| l.split_once(':')).find(|(k, _)| k.trim() == key).map(|(_, v)| one_line(v))
+    };
+    ["model name", "Hardware", "Model", "cpu model"].into_iter().find_map(value).unwrap_or_default()
 }
 
 /// A whole run.
@@ -125,6 +147,14 @@ pub struct Position {
 }
 
 impl Measurement {
+    /// A single result of ours: scene, part and contestant, and the quantity with its values.
+    pub fn new([scene, part, contestant]: [&str; 3], quantity: Quantity, values: Values) -> Self {
+        let [scene, part, contestant] = [scene, part, contestant].map(str::to_owned);
+        let (unit, better) = (quantity.unit.to_owned(), quantity.better);
+        let quantity = quantity.name.to_owned();
+        Self { scene, part, contestant, at: None, quantity, unit, better, is_peers: false, values }
+    }
+
     /// The subject of the measurement: scene, part, contestant, position.
     pub fn row(&self) -> String {
         let at = self.at.as_ref().filter(|at| at.axis != SIZE).map(|at| format!("{} {}", at.axis, at.value));
@@ -142,6 +172,8 @@ impl Measurement {
     }
 }
 
+/// Heads of the columns of a CSV table.
+const CSV_HEAD: &str = "benchmark,scene,part,contestant,axis,at,quantity,unit,median,p5,p25,p75,p95,count";
 /// Axis of results by the size of scenes: each scene has one.
 pub const SIZE: &str = "triangles and spheres";
 /// Axis of frames that follow each other.
@@ -152,44 +184,27 @@ pub const REFERENCE: &str = "reference";
 /// Adds results of one contestant in one part.
 pub struct Row<'a> {
     record: &'a mut Record,
-    scene: String,
-    part: String,
-    contestant: String,
-    at: Option<Position>,
-    is_peers: bool,
+    /// A measurement with all that they have in common; its quantity and values are those of none.
+    like: Measurement,
 }
 
 impl Row<'_> {
     /// The same row at a place along an axis.
     pub fn at(&mut self, axis: &str, value: f64) -> Row<'_> {
-        Row {
-            record: self.record,
-            scene: self.scene.clone(),
-            part: self.part.clone(),
-            contestant: self.contestant.clone(),
-            at: Some(Position { axis: axis.to_owned(), value }),
-            is_peers: self.is_peers,
-        }
+        let at = Some(Position { axis: axis.to_owned(), value });
+        Row { record: self.record, like: Measurement { at, ..self.like.clone() } }
     }
 
     /// The row as one of another program, or not.
     pub fn of_peer(mut self, is_peers: bool) -> Self {
-        self.is_peers = is_peers;
+        self.like.is_peers = is_peers;
         self
     }
 
     fn add(&mut self, quantity: Quantity, values: Values) {
-        self.record.measurements.push(Measurement {
-            scene: self.scene.clone(),
-            part: self.part.clone(),
-            contestant: self.contestant.clone(),
-            at: self.at.clone(),
-            quantity: quantity.name.to_owned(),
-            unit: quantity.unit.to_owned(),
-            better: quantity.better,
-            is_peers: self.is_peers,
-            values,
-        });
+        let Quantity { name, unit, better } = quantity;
+        let (quantity, unit) = (name.to_owned(), unit.to_owned());
+        self.record.measurements.push(Measurement { quantity, unit, better, values, ..self.like.clone() });
     }
 
     /// Adds what has no noise; nothing for what is not known.
@@ -204,9 +219,7 @@ impl Row<'_> {
         measured.into_iter().for_each(|p| self.add(quantity, Values::Repeated(p)));
         self
     }
-}
 
-impl Row<'_> {
     /// Adds the errors of an image.
     pub fn errors(&mut self, e: &ImageErrors) {
         self.exact(quantity::RMSE, e.rmse).exact(quantity::CORRECTED, e.corrected);
@@ -219,8 +232,7 @@ impl Row<'_> {
 impl Record {
     /// A row to add results to.
     pub fn row(&mut self, scene: &str, part: &str, contestant: &str) -> Row<'_> {
-        let [scene, part, contestant] = [scene, part, contestant].map(str::to_owned);
-        Row { record: self, scene, part, contestant, at: None, is_peers: false }
+        Row { record: self, like: Measurement::new([scene, part, contestant], plain("", ""), Values::Exact(f64::NAN)) }
     }
 
     /// The scene of this name, which is added where it is new.
@@ -252,30 +264,15 @@ impl Record {
     /// Writes a row for each result. What is not known is empty.
     pub fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
-        csv.write_record([
-            "benchmark",
-            "scene",
-            "part",
-            "contestant",
-            "axis",
-            "at",
-            "quantity",
-            "unit",
-            "median",
-            "p5",
-            "p25",
-            "p75",
-            "p95",
-            "count",
-        ])?;
+        csv.write_record(CSV_HEAD.split(','))?;
         for m in &self.measurements {
             let numbers = match m.values {
                 Values::Exact(v) => {
-                    [v.to_string(), String::new(), String::new(), String::new(), String::new(), "1".into()]
+                    vec![v.to_string(), String::new(), String::new(), String::new(), String::new(), "1".into()]
                 }
                 Values::Repeated(p) => {
-                    let [median, p5, p25, p75, p95] = [p.median, p.p5, p.p25, p.p75, p.p95].map(|v| v.to_string());
-                    [median, p5, p25, p75, p95, p.count.to_string()]
+                    let numbers = [p.median, p.p5, p.p25, p.p75, p.p95].into_iter().map(|v| v.to_string());
+                    numbers.chain([p.count.to_string()]).collect()
                 }
             };
             let (axis, at) = m.at.as_ref().map_or_else(Default::default, |at| (at.axis.clone(), at.value.to_string()));

@@ -103,47 +103,37 @@ fn compare(baseline: &Baseline, reported: &mut [ReportedRecord]) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
+    use serde_json::Value;
 
     use super::*;
     use crate::bench::page::{page, write_plot};
+    use crate::bench::record::{FRAME, HostInfo, REFERENCE, SIZE, SceneRecord, quantity};
+    use crate::measure::stats::Percentiles;
 
     /// A record with every kind of result.
     fn record() -> Value {
-        let times = json!({ "median": 2.0, "p5": 1.9, "p25": 1.95, "p75": 2.1, "p95": 2.3, "count": 8 });
-        let measured = |scene: &str, part: &str, contestant: &str, quantity: (&str, &str, &str), values: &Value| {
-            let (quantity, unit, better) = quantity;
-            json!({ "scene": scene, "part": part, "contestant": contestant, "quantity": quantity, "unit": unit, "better": better, "values": values })
-        };
-        let along = |mut m: Value, axis: &str, at: f64| {
-            m["at"] = json!({ "axis": axis, "value": at });
-            m
-        };
-        let mut all = Vec::new();
+        let [device, driver, cpu] = ["a device", "a driver", "a processor"].map(str::to_owned);
+        let host = HostInfo { version: "0.1.0".into(), device, driver, cpu, threads: 2 };
+        let settings = [("size".to_owned(), "64x36".to_owned())].into();
+        let mut record = Record { benchmark: BenchKind::Frames, host, settings, ..Record::default() };
+        let times = Percentiles { median: 2.0, p5: 1.9, p25: 1.95, p75: 2.1, p95: 2.3, count: 8 };
         for preset in ["fast", "quality"] {
-            all.push(measured("a", "still", preset, ("time", "ms", "less"), &times));
-            for name in ["RMSE", "corrected RMSE", "corrected plain RMSE"] {
-                all.push(measured("a", "still", preset, (name, "", "less"), &json!(0.1)));
-            }
+            let mut row = record.row("a", "still", preset);
+            row.repeated(quantity::FRAME_TIME, times).exact(quantity::RMSE, 0.1);
+            row.exact(quantity::CORRECTED, 0.1).exact(quantity::PLAIN_CORRECTED, 0.1);
             for frame in [1.0, 4.0] {
-                let exact = measured("a", "still", preset, ("RMSE", "", "neither"), &json!(0.2));
-                all.push(along(exact, "frame", frame));
-                all.push(along(measured("a", "images", preset, ("time", "s", "less"), &times), "spp", frame));
-                all.push(along(measured("a", "images", preset, ("RMSE", "", "less"), &times), "spp", frame));
-                all.push(along(measured("a", "turn", preset, ("RMSE", "", "less"), &json!(0.2)), "change", frame));
+                record.row("a", "still", preset).at(FRAME, frame).exact(quantity::RMSE.not_compared(), 0.2);
+                let mut images = record.row("a", "images", preset);
+                images.at("spp", frame).repeated(quantity::IMAGE_TIME, times).repeated(quantity::RMSE, times);
+                record.row("a", "turn", preset).at("change", frame).exact(quantity::RMSE, 0.2);
             }
         }
-        all.push(measured("a", "still", "reference", ("RMSE", "", "neither"), &json!(0.01)));
-        for scene in ["b:10", "b:100"] {
-            let size = scene[2..].parse().unwrap();
-            all.push(along(
-                measured(scene, "primary", "wide", ("rate", "Mrays/s", "more"), &times),
-                "triangles and spheres",
-                size,
-            ));
+        record.row("a", "still", REFERENCE).exact(quantity::RMSE.not_compared(), 0.01);
+        for (scene, size) in [("b:10", 10.0), ("b:100", 100.0)] {
+            record.row(scene, "primary", "wide").at(SIZE, size).repeated(quantity::RATE, times);
         }
-        json!({ "benchmark": "frames", "version": "0.1.0", "device": "a device", "driver": "a driver", "cpu": "a processor", "threads": 2,
-                "settings": { "size": "64x36" }, "scenes": [{ "scene": "a", "about": "small", "remarks": ["good"] }], "measurements": all })
+        *record.scene("a") = SceneRecord { scene: "a".into(), about: "small".into(), remarks: vec!["good".into()] };
+        serde_json::to_value(&record).unwrap()
     }
 
     /// Numbers of a value, each with the names and places that lead to it.

@@ -56,59 +56,50 @@ pub struct WellKnownScene {
     pub on_plane: bool,
 }
 
+/// A scene that is seen and lit as any other.
+const fn known(path: &'static str, near: LookAt, far: LookAt, reach: f64) -> WellKnownScene {
+    let (view, point_light, area_light) = (None, None, None);
+    let ao_radius = f64::INFINITY;
+    WellKnownScene { path, view, near, far, reach, ao_radius, point_light, area_light, on_plane: false }
+}
+
+const fn look(eye: [f64; 3], target: [f64; 3], fov_y: f64) -> LookAt {
+    LookAt { eye, target, fov_y }
+}
+
 pub const SPONZA: WellKnownScene = WellKnownScene {
-    path: "sponza/sponza.glb",
     view: Some(SPONZA_NAVE),
-    near: SPONZA_NAVE,
-    // into the courtyard from above its roof
-    far: LookAt { eye: [20.0, 330.0, 60.0], target: [-5.0, 20.0, -4.0], fov_y: 45.0 },
-    reach: 60.0,
     ao_radius: 60.0,
     // hanging in the nave: from outside, nothing of the view is lit
     point_light: Some([30.0, 70.0, -5.0]),
     // above the view: an image of a lamp has all of its error in the few pixels of the lamp's edge
     area_light: Some("sphere position=-60,95,-5 radius=4 radiance=400"),
-    on_plane: false,
+    ..known("sponza/sponza.glb", SPONZA_NAVE, SPONZA_COURT, 60.0)
 };
 
 /// Along the nave, from inside.
-const SPONZA_NAVE: LookAt = LookAt { eye: [-120.0, 20.0, -5.0], target: [50.0, 35.0, 0.0], fov_y: 70.0 };
+const SPONZA_NAVE: LookAt = look([-120.0, 20.0, -5.0], [50.0, 35.0, 0.0], 70.0);
+/// Into the courtyard, from above its roof.
+const SPONZA_COURT: LookAt = look([20.0, 330.0, 60.0], [-5.0, 20.0, -4.0], 45.0);
 
 pub const DRAGON: WellKnownScene = WellKnownScene {
-    path: "dragon/dragon.glb",
-    view: Some(LookAt { eye: [0.065, 0.1857, 0.198], target: [-0.0059, 0.125, -0.0046], fov_y: 45.0 }),
-    near: LookAt { eye: [0.03, 0.165, 0.12], target: [-0.012, 0.128, 0.0], fov_y: 45.0 },
-    far: LookAt { eye: [0.12, 0.24, 0.38], target: [-0.006, 0.125, -0.005], fov_y: 45.0 },
-    reach: 0.1,
-    ao_radius: f64::INFINITY,
-    point_light: None,
-    area_light: None,
-    on_plane: false,
+    view: Some(look([0.065, 0.1857, 0.198], [-0.0059, 0.125, -0.0046], 45.0)),
+    ..known("dragon/dragon.glb", DRAGON_NEAR, DRAGON_FAR, 0.1)
 };
 
-pub const BUNNY: WellKnownScene = WellKnownScene {
-    path: "bunny/bunny.glb",
-    view: None,
-    near: LookAt { eye: [0.01, 0.14, 0.115], target: [-0.02, 0.105, 0.0], fov_y: 45.0 },
-    far: LookAt { eye: [0.15, 0.27, 0.42], target: [-0.017, 0.095, 0.0], fov_y: 45.0 },
-    reach: 0.1,
-    ao_radius: f64::INFINITY,
-    point_light: None,
-    area_light: None,
-    on_plane: true,
-};
+const DRAGON_NEAR: LookAt = look([0.03, 0.165, 0.12], [-0.012, 0.128, 0.0], 45.0);
+const DRAGON_FAR: LookAt = look([0.12, 0.24, 0.38], [-0.006, 0.125, -0.005], 45.0);
 
-pub const FLIGHT_HELMET: WellKnownScene = WellKnownScene {
-    path: "flight_helmet/FlightHelmet.gltf",
-    view: None,
-    near: LookAt { eye: [0.1, 0.52, 0.4], target: [-0.03, 0.46, 0.05], fov_y: 45.0 },
-    far: LookAt { eye: [0.45, 0.75, 1.25], target: [-0.02, 0.35, 0.01], fov_y: 45.0 },
-    reach: 0.3,
-    ao_radius: f64::INFINITY,
-    point_light: None,
-    area_light: None,
-    on_plane: false,
-};
+pub const BUNNY: WellKnownScene =
+    WellKnownScene { on_plane: true, ..known("bunny/bunny.glb", BUNNY_NEAR, BUNNY_FAR, 0.1) };
+
+const BUNNY_NEAR: LookAt = look([0.01, 0.14, 0.115], [-0.02, 0.105, 0.0], 45.0);
+const BUNNY_FAR: LookAt = look([0.15, 0.27, 0.42], [-0.017, 0.095, 0.0], 45.0);
+
+pub const FLIGHT_HELMET: WellKnownScene = known("flight_helmet/FlightHelmet.gltf", HELMET_NEAR, HELMET_FAR, 0.3);
+
+const HELMET_NEAR: LookAt = look([0.1, 0.52, 0.4], [-0.03, 0.46, 0.05], 45.0);
+const HELMET_FAR: LookAt = look([0.45, 0.75, 1.25], [-0.02, 0.35, 0.01], 45.0);
 
 pub const WELL_KNOWN: [&WellKnownScene; 4] = [&SPONZA, &DRAGON, &BUNNY, &FLIGHT_HELMET];
 

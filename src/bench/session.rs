@@ -1,17 +1,18 @@
 //! A running benchmark: its device, peers, record, time limit and progress.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::baseline::{Baseline, BaselineReport};
 use super::common::{CommonArgs, JsonRecord, show_address};
-use super::device::BenchDevice;
 use super::page::ReportedRecord;
 use super::peers::file::PeerSpec;
 use super::peers::process::{Peer, PeerError};
-use super::record::Record;
+use super::record::{BenchKind, HostInfo, Record};
 use super::table;
 use crate::error::{Error, Result};
 use crate::files::plan::FilePlan;
+use crate::gpu::{Device, DeviceInfo, Options};
 use crate::scene::Scene;
 use crate::terminal::console::{Console, Failure, one_line};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -23,7 +24,7 @@ const STEPS: u64 = 1000;
 /// A running benchmark, with its arguments and its record.
 pub struct BenchSession<'a, A> {
     pub args: &'a A,
-    pub device: BenchDevice,
+    pub device: Arc<Device>,
     pub peers: Vec<Peer>,
     /// Progress bar and Ctrl-C of long work.
     pub control: ProgressControl,
@@ -40,16 +41,24 @@ pub struct BenchSession<'a, A> {
 }
 
 impl<'a, A> BenchSession<'a, A> {
-    /// Opens the device. `record` makes the record to fill, with the settings of the baseline.
-    pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> Record) -> Result<Self> {
+    /// Opens the device and begins a record. `settings`: what results depend on, which have to be
+    /// those of the baseline.
+    pub fn start(
+        args: &'a A,
+        common: &'a CommonArgs,
+        plan: FilePlan,
+        benchmark: BenchKind,
+        settings: impl FnOnce(&DeviceInfo) -> Vec<(&'static str, String)>,
+    ) -> Result<Self> {
         let start = Instant::now();
-        let plan = common.check()?;
         let baseline = common.baseline.as_deref().map(Baseline::read).transpose()?;
         interrupt::install();
         let console = common.outputs.console();
-        let device = BenchDevice::open(common)?;
+        let options = Options { device: common.device.clone(), validation: common.validation, ..Default::default() };
+        let device = Device::open(&options)?;
         let control = ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false };
-        let record = record(&device);
+        let settings = settings(&device.info).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        let record = Record { benchmark, host: HostInfo::new(&device.info), settings, ..Record::default() };
         baseline.as_ref().map_or(Ok(()), |b| b.check(&record))?;
         Ok(Self {
             args,
@@ -67,15 +76,13 @@ impl<'a, A> BenchSession<'a, A> {
         })
     }
 
-    /// Starts peers, or notes why they are left out, as all are where `specs` is a reason.
+    /// Starts peers, or notes why they are left out, as all are where `specs` is a reason; then
+    /// shows what the run is of.
     pub fn start_peers(&mut self, specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
-        let specs = match specs {
-            Ok(specs) => specs,
-            Err(why) => {
-                self.note(why);
-                return Ok(());
-            }
-        };
+        let specs = specs.unwrap_or_else(|why| {
+            self.note(why);
+            Vec::new()
+        });
         for spec in &specs {
             let activity = if spec.is_built() { "starting" } else { "compiling" };
             self.phase(format!("{activity} peer '{}': `{}`", spec.name, spec.command_line()));
@@ -85,12 +92,20 @@ impl<'a, A> BenchSession<'a, A> {
                 Err(PeerError::Failed(why)) => self.note(spec.missing(&why)),
             }
         }
-        Ok(())
+        self.record.peers = self.peers.iter().map(|p| p.title.clone()).collect();
+        self.show_title()
     }
 
-    /// Names of the peers that started, as they introduce themselves.
-    pub fn peer_titles(&self) -> Vec<String> {
-        self.peers.iter().map(|p| p.title.clone()).collect()
+    /// The outcome of a peer's work; `None`, and a note that begins with `what`, where it failed.
+    pub fn unless_peer_fails<T>(&mut self, what: &str, outcome: Result<T, PeerError>) -> Result<Option<T>> {
+        match outcome {
+            Ok(done) => Ok(Some(done)),
+            Err(PeerError::Ours(e)) => Err(e),
+            Err(PeerError::Failed(why)) => {
+                self.note(format!("{what}: {why}"));
+                Ok(None)
+            }
+        }
     }
 
     /// Says how many jobs there are.
@@ -137,6 +152,16 @@ impl<'a, A> BenchSession<'a, A> {
     pub fn leave_out(&mut self, what: &str) {
         self.stop_early();
         self.note(format!("time limit: {what}: left out"));
+    }
+
+    /// Says what is done from here on, or notes that the time limit took it. Returns which.
+    pub fn has_time_for(&mut self, what: String) -> bool {
+        if self.is_over() {
+            self.leave_out(&what);
+            return false;
+        }
+        self.phase(what);
+        true
     }
 
     /// Records that the time limit took something.
@@ -191,7 +216,10 @@ impl<'a, A> BenchSession<'a, A> {
         let Self { record, device, common, console, failure, control, peers, baseline, .. } = self;
         // before anything is printed
         drop((control, peers));
-        let valid = device.close(measured.is_ok());
+        let valid = device.check_validation();
+        if measured.is_ok() {
+            device.save_pipeline_cache();
+        }
         let compared = baseline.filter(|_| !record.is_empty()).map(|b| b.compare(&record));
         let shown = compared
             .as_ref()

@@ -15,18 +15,20 @@ use crate::accel::flatten::FlatScene;
 use crate::accel::lab::analysis::{TreeAnalysis, TreeCost, analyse};
 use crate::accel::lab::budget::{IMAGE_RAYS, LightBudget, Whole, light_budget};
 use crate::accel::lab::builder::MAX_LEAF;
-use crate::accel::lab::influence::{InfluenceArea, Placement, areas_of_rays, areas_of_scene, light_name};
+use crate::accel::lab::influence::{
+    InfluenceArea, Placement, areas_of_rays, areas_of_scene, distribution_of, light_name,
+};
 use crate::accel::lab::local::{FallbackStart, LocalTrees, TopLevelKind};
 use crate::accel::lab::streams::{
     RayStream, camera_rays, corners, image_streams, parallel_rays, point_rays, surfaces, usual_lights,
 };
-use crate::accel::lab::{Body, Builder, Heuristic, HeuristicChoice, Hierarchy, LabRay, Query, RayDistribution};
+use crate::accel::lab::{Body, Builder, Heuristic, HeuristicChoice, Hierarchy, LabRay, Query, RayDistribution, Visits};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::plan::FilePlan;
 use crate::film::camera::{self, Choice};
 use crate::integrators::rays;
-use crate::ray::translate;
+use crate::ray::{Ray, translate};
 use crate::scene::{Camera, Light, Scene, SceneSettings};
 use crate::settings::parse::parse_vector;
 use crate::terminal::console::{Failure, Verbosity};
@@ -154,6 +156,24 @@ pub struct StreamCounts {
     pub primitives: f64,
     /// 2.0 an inner node and 1.2 a primitive.
     pub cost: f64,
+}
+
+impl StreamCounts {
+    fn new(stream: &RayStream, query: Query, kernel: &'static str, (visits, hits): (Visits, u64)) -> Self {
+        let rays = stream.rays.len();
+        let mean = |n: u64| n as f64 / rays.max(1) as f64;
+        Self {
+            name: stream.name.clone(),
+            query: query_name(query),
+            kernel,
+            rays,
+            hits: mean(hits),
+            nodes: mean(visits.nodes),
+            boxes: Some(mean(visits.boxes)),
+            primitives: mean(visits.primitives),
+            cost: visits.cost() / rays.max(1) as f64,
+        }
+    }
 }
 
 /// Everything that text, JSON and the page show.
@@ -332,16 +352,7 @@ impl BvhArgs {
         let given =
             self.direction.map(RayDistribution::Parallel).or(self.eye.map(|e| RayDistribution::Point(e - origin)));
         let Some(rays) = recorded.filter(|_| given.is_none()) else { return Ok(given) };
-        let areas = areas_of_rays("recorded rays", rays, bounds);
-        let found = match areas.as_slice() {
-            [] => None,
-            [one] => Some(one.rays),
-            // all around one point
-            [first, ..] => match first.rays {
-                RayDistribution::View(view) => Some(RayDistribution::Point(view.eye)),
-                other => Some(other),
-            },
-        };
+        let found = distribution_of(&areas_of_rays("recorded rays", rays, bounds));
         if found.is_none() && self.build.heuristic().is_some_and(HeuristicChoice::needs_rays) {
             let path = self.rays.clone().unwrap_or_default();
             let why = format!(
@@ -452,31 +463,14 @@ fn query_name(query: Query) -> &'static str {
 fn count(hierarchy: &Hierarchy, stream: &RayStream) -> Vec<StreamCounts> {
     let each = |query| {
         let (visits, hits) = hierarchy.visits(&stream.rays, query);
-        let mean = |n: u64| n as f64 / stream.rays.len().max(1) as f64;
-        StreamCounts {
-            name: stream.name.clone(),
-            query: query_name(query),
-            kernel: "nearest",
-            rays: stream.rays.len(),
-            hits: mean(hits),
-            nodes: mean(visits.nodes),
-            boxes: Some(mean(visits.boxes)),
-            primitives: mean(visits.primitives),
-            cost: visits.cost() / stream.rays.len().max(1) as f64,
-        }
+        StreamCounts::new(stream, query, "nearest", (visits, hits))
     };
     [Query::Closest, Query::Any, Query::Exhaustive].map(each).to_vec()
 }
 
 /// Counts of a stream in the wide hierarchy.
 fn count_wide(counter: &VisitCounter, stream: &RayStream) -> StreamCounts {
-    let narrow = |r: &LabRay| crate::ray::Ray {
-        origin: r.origin.as_vec3().to_array(),
-        tmin: r.tmin as f32,
-        direction: r.direction.as_vec3().to_array(),
-        tmax: r.tmax as f32,
-    };
-    let rays: Vec<_> = stream.rays.iter().map(narrow).collect();
+    let rays: Vec<Ray> = stream.rays.iter().map(|r| Ray::new(r.origin, r.direction, [r.tmin, r.tmax])).collect();
     let visits = counter.mean(&rays, stream.query == Query::Any);
     StreamCounts {
         name: stream.name.clone(),
@@ -506,19 +500,10 @@ fn count_local(
     for stream in streams {
         for query in [Query::Closest, Query::Any] {
             let v = trees.visits(&stream.rays, query);
-            let mean = |n: u64| n as f64 / stream.rays.len().max(1) as f64;
             let both = v.local.plus(v.whole);
-            counts.push(StreamCounts {
-                name: stream.name.clone(),
-                query: query_name(query),
-                kernel: "local trees",
-                rays: stream.rays.len(),
-                hits: mean(v.hits),
-                nodes: mean(both.nodes),
-                boxes: Some(mean(both.boxes + v.top)),
-                primitives: mean(both.primitives),
-                cost: both.cost() / stream.rays.len().max(1) as f64,
-            });
+            // the top level is boxes alone
+            let visits = Visits { boxes: both.boxes + v.top, ..both };
+            counts.push(StreamCounts::new(stream, query, "local trees", (visits, v.hits)));
         }
     }
     Ok(trees.locals().iter().map(|l| (l.area.name.clone(), l.tree.primitive_indices.len() as u64)).collect())

@@ -447,15 +447,10 @@ impl Control for RenderControl<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[derive(clap::Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: CompareArgs,
-    }
+    use crate::settings::parse::parse_args;
 
     fn parse(line: &str) -> CompareArgs {
-        <Alone as clap::Parser>::try_parse_from(line.split(' ')).unwrap().args
+        parse_args(&line.split(' ').skip(1).collect::<Vec<_>>()).unwrap()
     }
 
     #[test]

@@ -326,9 +326,9 @@ fn interval([low, high]: [Option<f64>; 2]) -> String {
 mod plot {
     use std::path::Path;
 
-    use super::{FitRecord, Report, Result, page, report, significant};
+    use super::{FitRecord, Report, Result, page, report};
     use crate::integrators::path::ambient::EnvironmentLight;
-    use crate::report::{Axis, Chart, Point, Series};
+    use crate::report::{Axis, Chart, Mark};
 
     /// Checks before anything is rendered that the plot can be written.
     pub fn check(path: &Path) -> Result<()> {
@@ -353,21 +353,12 @@ mod plot {
             Some(EnvironmentLight::Traced) => "path tracing; ambient: bounces",
             None => "ao-sky",
         };
-        let series = fit.curves.iter().map(|curve| {
-            let name = match curve.half_distance {
-                None => "binary".into(),
-                Some(half) => format!("halves every {}", significant(half)),
-            };
-            // an infinite radius has no place on a logarithmic axis
-            let points = curve.radii.iter().zip(&curve.rmse).filter_map(|(r, e)| Some(Point::from(((*r)?, *e))));
-            Series { name, points: points.collect(), ..Series::default() }
-        });
         Chart {
             title: title.into(),
             caption: "Error by the radius of ambient occlusion.".into(),
             x: Axis::logarithmic("AO radius, scene units"),
             y: Axis::logarithmic("RMSE"),
-            series: series.collect(),
+            series: page::error_curves(fit, Mark::LineAndPoints),
         }
     }
 }

@@ -220,17 +220,13 @@ fn run_script(options: &ViewOptions, script: &Path, verbosity: &Verbosity) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::parse::parse_args;
 
     #[test]
     fn settings_without_effect_are_refused() {
-        #[derive(clap::Parser)]
-        struct Alone {
-            #[command(flatten)]
-            settings: RenderSettings,
-        }
         let check = |line: &str| {
-            let args = ["a"].into_iter().chain(line.split_whitespace());
-            check_has_effect(&<Alone as clap::Parser>::try_parse_from(args).unwrap().settings)
+            let words: Vec<&str> = line.split_whitespace().collect();
+            check_has_effect(&parse_args(&words).unwrap())
         };
         for line in [
             "--time-limit 3",

@@ -144,8 +144,8 @@ impl DrawRecorder<'_, '_> {
     pub fn bind(&mut self, pipeline: &GraphicsPipeline) {
         let (raw, buffer) = (&self.recorder.device.raw, self.recorder.buffer);
         // SAFETY: recording state; the pipeline was made for these targets
-        unsafe { raw.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.raw) };
-        self.bound = Some(pipeline.layout);
+        unsafe { raw.cmd_bind_pipeline(buffer, vk::PipelineBindPoint::GRAPHICS, pipeline.0.raw) };
+        self.bound = Some(pipeline.0.layout);
     }
 
     /// Sets the push constants of the next draws. The addresses in `push` must be those of live

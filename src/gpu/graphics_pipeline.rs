@@ -7,7 +7,7 @@ use ash::vk;
 
 use super::device::Device;
 use super::formats::{DEPTH, IDS};
-use super::pipeline::{CompileTimer, Module, Specialization, layout};
+use super::pipeline::{CompileTimer, Compiled, Module, Specialization, layout};
 use super::result::Context;
 use crate::error::Result;
 use crate::shaders::Shader;
@@ -26,11 +26,7 @@ pub enum Cull {
 }
 
 /// A pipeline of a vertex and a fragment shader.
-pub struct GraphicsPipeline {
-    pub(super) raw: vk::Pipeline,
-    pub(super) layout: vk::PipelineLayout,
-    device: Arc<Device>,
-}
+pub struct GraphicsPipeline(pub(super) Compiled);
 
 impl GraphicsPipeline {
     /// Compiles two shaders with entry point `main` and the same specialization. The depth test
@@ -46,8 +42,7 @@ impl GraphicsPipeline {
         let _timer = CompileTimer::start();
         let module = |shader| Module::new(device, name, shader, specialization);
         let modules = [module(vertex)?, module(fragment)?];
-        let mut pipeline =
-            Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
+        let mut pipeline = Compiled::begin(device, layout(device, DRAW_STAGES)?);
 
         // no vertex buffers: shaders read the scene's records themselves
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
@@ -104,16 +99,6 @@ impl GraphicsPipeline {
             .map_err(|e| e.1)
             .context(name)?[0];
         device.name(pipeline.raw, name);
-        Ok(pipeline)
-    }
-}
-
-impl Drop for GraphicsPipeline {
-    fn drop(&mut self) {
-        // SAFETY: submissions are waited for
-        unsafe {
-            self.device.raw.destroy_pipeline(self.raw, None);
-            self.device.raw.destroy_pipeline_layout(self.layout, None);
-        }
+        Ok(Self(pipeline))
     }
 }

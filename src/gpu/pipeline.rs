@@ -122,12 +122,19 @@ impl Key {
 }
 
 /// A pipeline and its layout, destroyed with the last handle.
-struct Compiled {
-    raw: vk::Pipeline,
-    layout: vk::PipelineLayout,
+pub(super) struct Compiled {
+    pub(super) raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
     /// The shader binding table of a ray-tracing pipeline.
     table: Option<Table>,
     device: Arc<Device>,
+}
+
+impl Compiled {
+    /// A layout whose pipeline is yet to be compiled.
+    pub(super) fn begin(device: &Arc<Device>, layout: vk::PipelineLayout) -> Self {
+        Self { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() }
+    }
 }
 
 impl Drop for Compiled {
@@ -258,14 +265,13 @@ impl ComputePipeline {
         let key = Key::new([shader], specialization, flags.as_raw())?;
         let make = || {
             let module = Module::new(device, name, shader, specialization)?;
-            let layout = layout(device, vk::ShaderStageFlags::COMPUTE)?;
-            let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
+            let mut pipeline = Compiled::begin(device, layout(device, vk::ShaderStageFlags::COMPUTE)?);
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .flags(flags)
                 .module(module.raw)
                 .name(c"main");
-            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
             // SAFETY: module and layout are of this device
             pipeline.raw = unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }
                 .map_err(|e| e.1)
@@ -404,8 +410,7 @@ impl RayTracingPipeline {
             modules.push((module("sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
         }
 
-        let layout = layout(device, RAY_STAGES)?;
-        let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
+        let mut pipeline = Compiled::begin(device, layout(device, RAY_STAGES)?);
         let stages: Vec<_> = modules
             .iter()
             .map(|(m, stage)| vk::PipelineShaderStageCreateInfo::default().stage(*stage).module(m.raw).name(c"main"))

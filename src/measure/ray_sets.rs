@@ -30,12 +30,7 @@ fn random_direction(seed: u32, index: usize, k: u32) -> DVec3 {
 
 /// The ray rounded to single precision.
 pub fn narrow(ray: &OracleRay) -> Ray {
-    Ray {
-        origin: ray.origin.as_vec3().to_array(),
-        tmin: ray.tmin as f32,
-        direction: ray.direction.as_vec3().to_array(),
-        tmax: ray.tmax as f32,
-    }
+    Ray::new(ray.origin, ray.direction, [ray.tmin, ray.tmax])
 }
 
 /// `count` rays from points in and around the scene's bounds, half of them in any direction, half

@@ -96,8 +96,8 @@ pub struct Resolved {
 /// which prevails. `confine` says where the latter, and files that it names, must lie.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may
-/// not choose, and for a file that lies elsewhere.
+/// [`Error::Input`] for files that cannot be read, unknown settings and wrong values, a setting
+/// that a scene's folder may not choose, and a file that lies elsewhere.
 pub fn find(scene: Option<&str>, confine: Confine) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
@@ -153,14 +153,7 @@ impl DefaultsFile {
         files.try_for_each(|path| confine::check(folder, &self.path, path))
     }
 
-    /// Reads a file of defaults. Relative paths in it start at its folder.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for files that cannot be read, unknown settings and wrong values.
-    pub fn load(path: &Path) -> Result<Self> {
-        Self::parse(path, &files::read_text(path)?)
-    }
-
+    /// A file with this text. Relative paths in it start at its folder.
     fn parse(path: &Path, text: &str) -> Result<Self> {
         let mut table = table(path, text)?;
         let device =

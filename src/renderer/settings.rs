@@ -27,7 +27,9 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::camera::ViewHeight;
 use crate::scene::{Camera, ClipPlanes, Ground, Projection, Scene, SceneSettings};
 #[cfg(feature = "cli")]
-use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
+use crate::settings::parse::{
+    parse_args, parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message,
+};
 use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
 
 /// Samples per pixel when neither the settings nor the scene give them.
@@ -446,8 +448,7 @@ impl RenderSettings {
     /// [`Error::Usage`], naming the line, and those of [`RenderSettings::load`].
     #[cfg(feature = "cli")]
     pub fn from_words(line: &str) -> Result<Self> {
-        #[derive(clap::Parser)]
-        #[command(no_binary_name = true, disable_help_flag = true, disable_version_flag = true)]
+        #[derive(clap::Args)]
         struct Words {
             #[arg(long = "settings")]
             file: Option<PathBuf>,
@@ -467,7 +468,7 @@ impl RenderSettings {
             };
             words.insert(0, option.to_owned());
         }
-        let words = <Words as clap::Parser>::try_parse_from(words).map_err(|e| wrong(usage_message(&e)))?;
+        let words: Words = parse_args(&words).map_err(|e| wrong(usage_message(&e)))?;
         words.settings.over_file(words.file.as_deref())
     }
 
@@ -789,15 +790,7 @@ mod tests {
 
     #[test]
     fn flags_are_those_of_the_command_line() {
-        #[derive(clap::Parser)]
-        struct Alone {
-            #[command(flatten)]
-            settings: RenderSettings,
-        }
-        let parse = |args: &[String]| {
-            let args = std::iter::once("a".to_owned()).chain(args.iter().cloned());
-            <Alone as clap::Parser>::try_parse_from(args).unwrap().settings
-        };
+        let parse = |args: &[String]| -> RenderSettings { parse_args(args).unwrap() };
         let given = "--integrator path --spp 3 --size 20x10 --aov depth,ids --eye -1,2.5,3e-7 --target 0,0,0 --fov-y 30 --max-depth 4 \
             --energy-compensation --tone-map agx --exposure -1.5 --environment 1,1,1 --resumable --ao-radius 1.25 --preset fast --frames 2..5 --show depth --mtl-dissolve glass";
         let mut given: Vec<String> = given.split_whitespace().map(str::to_owned).collect();

@@ -98,11 +98,6 @@ impl StillSequence<'_> {
         &self.completed.choices
     }
 
-    /// Frame rate, frames per second.
-    pub fn fps(&self) -> f64 {
-        self.fps
-    }
-
     /// Image size in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.completed.settings.size(&self.renderer.scene)

@@ -43,8 +43,6 @@ pub struct Cell {
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     Good,
-    /// It holds, but something is to be looked at.
-    Warning,
     Bad,
 }
 

@@ -79,3 +79,10 @@ pub struct EnvironmentMap {
     /// Rotation from world directions to the map's.
     pub to_map: DMat3,
 }
+
+impl EnvironmentMap {
+    /// A map as it is, neither turned nor scaled.
+    pub fn new(name: impl Into<String>, [width, height]: [u32; 2], radiance: Arc<[Vec3]>) -> Self {
+        Self { name: name.into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY }
+    }
+}

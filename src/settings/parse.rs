@@ -25,6 +25,13 @@ pub fn usage_message(error: &clap::Error) -> String {
     words.trim_start_matches("error: ").to_owned() + remedy
 }
 
+/// Options as they are parsed alone from the words of a command line, without its command.
+#[cfg(feature = "cli")]
+pub fn parse_args<A: clap::Args>(words: &[impl AsRef<str>]) -> std::result::Result<A, clap::Error> {
+    let command = clap::Command::new("skylit").no_binary_name(true).disable_help_flag(true).disable_version_flag(true);
+    A::from_arg_matches(&A::augment_args(command).try_get_matches_from(words.iter().map(AsRef::as_ref))?)
+}
+
 /// Any number that is not NaN.
 pub fn parse_number(text: &str) -> Parsed<f64> {
     text.trim().parse::<f64>().ok().filter(|v| !v.is_nan()).ok_or_else(|| "expected a number".to_owned())

@@ -22,7 +22,6 @@ pub enum Verdict {
 #[serde(rename_all = "kebab-case")]
 pub enum Bound {
     AtMost(f64),
-    AtLeast(f64),
 }
 
 impl Bound {
@@ -30,7 +29,6 @@ impl Bound {
     pub fn holds(self, value: f64) -> bool {
         match self {
             Bound::AtMost(bound) => value <= bound,
-            Bound::AtLeast(bound) => value >= bound,
         }
     }
 }
@@ -81,11 +79,6 @@ impl Check {
         Self::new(name, value, unit, Some(Bound::AtMost(bound)))
     }
 
-    /// A check that holds for figures from `bound` on.
-    pub fn at_least(name: impl Into<String>, value: f64, unit: &'static str, bound: f64) -> Self {
-        Self::new(name, value, unit, Some(Bound::AtLeast(bound)))
-    }
-
     pub fn reported(name: impl Into<String>, value: f64, unit: &'static str) -> Self {
         Self::new(name, value, unit, None)
     }
@@ -124,7 +117,6 @@ impl Check {
         match self.bound {
             None => String::new(),
             Some(Bound::AtMost(b)) => format!("at most {}", number(b)),
-            Some(Bound::AtLeast(b)) => format!("at least {}", number(b)),
         }
     }
 }
@@ -156,7 +148,6 @@ mod tests {
         assert_eq!(verdict(Check::at_most("a", 1.0, "", 1.0)), Verdict::Holds);
         assert_eq!(verdict(Check::at_most("a", 1.1, "", 1.0)), Verdict::Fails);
         assert_eq!(verdict(Check::at_most("a", f64::NAN, "", 1.0)), Verdict::Fails);
-        assert_eq!(verdict(Check::at_least("a", 0.9, "", 1.0)), Verdict::Fails);
         assert_eq!(verdict(Check::reported("a", f64::NAN, "")), Verdict::Reported);
         assert_eq!(verdict(Check::none_of("a", 1, "leaks", true)), Verdict::Fails);
         assert_eq!(verdict(Check::none_of("a", 1, "leaks", false)), Verdict::Reported);

@@ -95,8 +95,6 @@ pub struct Slack {
     pub self_hits: usize,
     /// Factor by which offsets could be smaller before a ray meets the plane again, or infinity.
     pub factor: f64,
-    /// Rays between the plane and a sheet at twice the largest offset that do not meet the sheet.
-    pub bridged: usize,
 }
 
 /// Spawned rays of an image of a plane through `point` with unit normal `normal`, traced again with
@@ -154,7 +152,6 @@ pub fn slack(
         roundings: largest * multiply / (reach * f64::from(f32::EPSILON) * 0.5),
         self_hits,
         factor,
-        bridged: 0,
     })
 }
 

@@ -1,9 +1,7 @@
 //! Section 6, sampling: furnaces over roughness, extreme environment maps and lights. No sample may
 //! be NaN or infinite: the film counts those and rejects them, in every render.
 
-use std::sync::Arc;
-
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::{Check, Effort, Section, Setup, StressSession, Watch};
 use crate::accel::flatten::FlatScene;
@@ -120,15 +118,8 @@ pub fn not_finite(film: &Film) -> u64 {
 
 /// An equirectangular map; `texel(x, y)` is the radiance of a texel.
 pub fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
-    let radiance: Arc<[Vec3]> = (0..width * height).map(|k| Vec3::splat(texel(k % width, k / width))).collect();
-    Environment::Map(EnvironmentMap {
-        name: "map".into(),
-        width,
-        height,
-        radiance,
-        factor: Vec3::ONE,
-        to_map: DMat3::IDENTITY,
-    })
+    let radiance = (0..width * height).map(|k| Vec3::splat(texel(k % width, k / width))).collect();
+    Environment::Map(EnvironmentMap::new("map", [width, height], radiance))
 }
 
 /// Mean radiance of [`furnace`] with white plastic as smooth as a mirror, in `size` by `size`

@@ -338,18 +338,13 @@ impl DeviceSettings {
 #[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
+    use crate::settings::parse::parse_args;
 
     #[test]
     fn options_without_effect_are_refused() {
-        #[derive(clap::Parser)]
-        struct Alone {
-            #[command(flatten)]
-            device: DeviceSettings,
-        }
         let refused = |line: &str| {
-            let args = ["a"].into_iter().chain(line.split_whitespace());
-            let device = <Alone as clap::Parser>::try_parse_from(args).unwrap().device;
-            device.check().err().map(|e| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            parse_args::<DeviceSettings>(&words).unwrap().check().err().map(|e| {
                 assert_eq!(e.exit_code(), 64);
                 e.to_string()
             })

@@ -11,7 +11,7 @@ use crate::output::{Channel, Image, Samples};
 use crate::renderer::Renderer;
 use crate::scene::SceneSettings;
 use crate::settings::Length;
-use crate::settings::parse::usage_message;
+use crate::settings::parse::{parse_args, usage_message};
 use crate::tracer::DeviceSettings;
 
 /// Metadata with the radius of occlusion, scene units.
@@ -32,16 +32,9 @@ impl BakedFrame {
     /// # Errors
     /// [`Error::Usage`] with what is wrong.
     pub fn parse(line: &str) -> Result<Self> {
-        #[derive(clap::Parser)]
-        #[command(no_binary_name = true, disable_help_flag = true, disable_version_flag = true)]
-        struct Words {
-            #[command(flatten)]
-            options: BakeOptions,
-        }
         let wrong = |what: &str| Error::Usage(format!("\"{line}\": {what}"));
         let words = shlex::split(line).ok_or_else(|| wrong("a quotation mark is not closed"))?;
-        let parsed = <Words as clap::Parser>::try_parse_from(&words);
-        let Words { options } = parsed.map_err(|e| wrong(&usage_message(&e)))?;
+        let options: BakeOptions = parse_args(&words).map_err(|e| wrong(&usage_message(&e)))?;
         options.check()?;
         Ok(Self { words: words.join(" "), options })
     }

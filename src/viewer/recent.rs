@@ -1,7 +1,9 @@
 //! Scenes that were opened before, in a file of the cache folder.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
 
 use crate::files;
 
@@ -29,9 +31,13 @@ pub fn add(recent: &mut Vec<String>, source: &str) {
     recent.retain(|r| *r != source);
     recent.insert(0, source);
     recent.truncate(MOST);
-    let Some(path) = path() else { return };
+    path().into_iter().for_each(|path| remember(&path, recent));
+}
+
+/// Writes something that the next time reads, as JSON. A failure only forgets.
+pub(super) fn remember(path: &Path, value: &impl Serialize) {
     if let Some(folder) = path.parent() {
         let _ = std::fs::create_dir_all(folder);
     }
-    let _ = files::write_atomically(&path, |file| file.write_all(&serde_json::to_vec(recent)?));
+    let _ = files::write_atomically(path, |file| file.write_all(&serde_json::to_vec(value)?));
 }

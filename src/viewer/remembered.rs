@@ -1,11 +1,11 @@
 //! State that the viewer knows the next time: its window, how it looks, environments that were
 //! used, and the hints that are no longer needed. It is a file of the cache folder.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::recent;
 use crate::files;
 
 /// Number of environments that are remembered.
@@ -66,11 +66,7 @@ impl Remembered {
 
     /// Saves it. A failure only forgets.
     pub fn save(&self) {
-        let Some(path) = path() else { return };
-        if let Some(folder) = path.parent() {
-            let _ = std::fs::create_dir_all(folder);
-        }
-        let _ = files::write_atomically(&path, |file| file.write_all(&serde_json::to_vec(self)?));
+        path().into_iter().for_each(|path| recent::remember(&path, self));
     }
 
     /// Returns true if a hint is still to be shown.

@@ -21,40 +21,7 @@ const OPENING: Duration = Duration::from_secs(2);
 /// Time in which a control comes into view that a list or the panel has scrolled away.
 const SCROLLING: Duration = Duration::from_millis(200);
 
-/// The commands, for help and docs/guide/viewer.md.
-pub const COMMANDS: &[(&str, &str)] = &[
-    ("wait SECONDS", "let time pass"),
-    (
-        "wait picture|settled [SECONDS]",
-        "until the first image has a picture, or all have settled; at most so long [120]; fails at once where a scene or an image cannot be had",
-    ),
-    (
-        "wait samples N [SECONDS]",
-        "until the first image has N samples of each pixel, or has settled; at most so long [120]",
-    ),
-    ("wait compared [SECONDS]", "until there is a comparison with the truth"),
-    ("wait text:TEXT", "until a control or label contains the text; at most 120 seconds"),
-    ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
-    ("type TEXT", "type into what has the focus"),
-    ("click LABEL", "click on the control of this name"),
-    ("set LABEL = VALUE", "set the slider or number of this name"),
-    ("press X Y [left|right|middle] [2]", "click at a place, in points; 2: double click"),
-    ("drag X Y TO_X TO_Y [SECONDS] [left|right|middle|shift]", "drag, in points"),
-    ("drag-control LABEL DX DY [SECONDS]", "drag a control, by so many points"),
-    ("wheel X Y LINES", "turn the wheel at a place"),
-    ("resize WIDTH HEIGHT", "change the size of the window, in points (without a window)"),
-    (
-        "scale FACTOR",
-        "move the window to a display whose scale is FACTOR, 0.25 to 4: it keeps its size in points (without a window)",
-    ),
-    ("drop FILE", "drop a file on the window"),
-    ("screenshot FILE.png", "save what the window shows"),
-    ("mark NAME", "begin a new section of the report"),
-    ("expect LABEL", "fail unless there is a control or label that contains the text"),
-    ("expect-no-errors", "fail if an error or warning has been shown"),
-];
-
-/// A command of a script.
+/// A command of a script; docs/design/testing.md has all of them.
 #[derive(Clone, Debug, PartialEq)]
 enum Command {
     Wait(Duration),

@@ -135,18 +135,6 @@ impl Technique {
         if integrator.can(Capability::AmbientVisibility) { Self::Converged } else { Self::Still(integrator) }
     }
 
-    /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same
-    /// meaning.
-    pub fn is_occlusion(self) -> bool {
-        match self {
-            Self::Preset(_) | Self::Gtao | Self::Converged => true,
-            Self::Still(integrator) | Self::Frames(integrator) => {
-                integrator.can(Capability::AmbientVisibility) || integrator.can(Capability::WhiteSky)
-            }
-            Self::Buffer(mode) => mode == DisplayMode::Unfiltered,
-        }
-    }
-
     /// Settings of an image of it: those of `base` that apply to it.
     pub fn settings(self, base: &RenderSettings) -> RenderSettings {
         let mut settings = RenderSettings {

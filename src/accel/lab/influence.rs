@@ -134,6 +134,19 @@ pub fn areas_of_light(light: &Light, name: &str, corners: &[DVec3; 8], origin: D
     }
 }
 
+/// The distribution of rays with these influence areas, for rules of a whole tree; `None` without.
+pub fn distribution_of(areas: &[InfluenceArea]) -> Option<RayDistribution> {
+    match areas {
+        [] => None,
+        [only] => Some(only.rays),
+        // all around one point
+        [first, ..] => match first.rays {
+            RayDistribution::View(view) => Some(RayDistribution::Point(view.eye)),
+            other => Some(other),
+        },
+    }
+}
+
 /// Influence areas of recorded rays within bounds: a box where all have one direction, one frustum
 /// or six where their lines meet in a point; none where they do neither.
 pub fn areas_of_rays(name: &str, rays: &[LabRay], corners: &[DVec3]) -> Vec<InfluenceArea> {

@@ -194,24 +194,14 @@ impl BaselineReport {
 
 #[cfg(test)]
 mod tests {
-    use super::super::record::HostInfo;
+    use super::super::record::{HostInfo, Quantity};
     use super::*;
     use crate::measure::regression::Values;
     use crate::measure::stats::Percentiles;
 
     fn result(row: &str, values: &[f64]) -> Measurement {
         let values = Values::Repeated(Percentiles::from_values(values).unwrap());
-        Measurement {
-            scene: row.into(),
-            part: String::new(),
-            contestant: String::new(),
-            at: None,
-            quantity: "ms".into(),
-            unit: String::new(),
-            better: Better::Less,
-            is_peers: false,
-            values,
-        }
+        Measurement::new([row, "", ""], Quantity { name: "ms", unit: "", better: Better::Less }, values)
     }
 
     fn run(measurements: Vec<Measurement>) -> Record {

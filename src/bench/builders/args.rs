@@ -49,12 +49,12 @@ pub struct BenchBuildersArgs {
 impl BenchBuildersArgs {
     /// Size of the images.
     pub fn size(&self) -> [u32; 2] {
-        let width = self.common.setting(self.width, 256, 64);
+        let width = self.common.setting(self.width, [256, 64]);
         [width, (width * 9 / 16).max(1)]
     }
 
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
-        self.common.setting(self.repeats, 5, 1)
+        self.common.setting(self.repeats, [5, 1])
     }
 }

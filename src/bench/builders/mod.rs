@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 pub use args::BenchBuildersArgs;
 
-use super::record::{BenchKind, Record};
+use super::record::BenchKind;
 use super::scenes::{DRAGON, SPONZA, SceneList, check_exists, shared_folder};
 use super::session::BenchSession;
 use crate::accel::lab::influence::Placement;
@@ -30,12 +30,10 @@ pub fn run(args: &BenchBuildersArgs) -> Result<(), Failure> {
         named => SceneList::from_sources(named),
     };
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
-    args.common.check_inputs(&scenes.sources, None, None)?;
-    let mut session = BenchSession::start(args, &args.common, |device| Record {
-        benchmark: BenchKind::Builders,
-        host: device.host_info(),
-        settings: [("image".to_owned(), format!("{}x{}", args.size()[0], args.size()[1]))].into(),
-        ..Record::default()
+    let plan = args.common.check(&scenes.sources, None, None)?;
+    let mut session = BenchSession::start(args, &args.common, plan, BenchKind::Builders, |_| {
+        let [width, height] = args.size();
+        vec![("image", format!("{width}x{height}"))]
     })?;
     scenes.notes.into_iter().chain(missing).for_each(|n| session.note(n));
     let measured = measure(&mut session, &placements, &runs, &scenes.sources);

@@ -11,7 +11,7 @@ use crate::accel::lab::analysis::analyse;
 use crate::accel::lab::budget::Whole;
 use crate::accel::lab::builder::MAX_LEAF;
 use crate::accel::lab::cells::{CellKind, Cells};
-use crate::accel::lab::influence::{InfluenceArea, areas_of_rays};
+use crate::accel::lab::influence::{InfluenceArea, areas_of_rays, distribution_of};
 use crate::accel::lab::local::{FallbackStart, LocalTrees, TopLevelKind};
 use crate::accel::lab::projection::frame;
 use crate::accel::lab::streams::{RayStream, corners, image_streams};
@@ -25,7 +25,7 @@ use crate::ray::Ray;
 use crate::report::thousands;
 use crate::scene::Scene;
 use crate::terminal::interrupt::{self, SilentControl};
-use crate::tracer::{BuildOptions, Kernel, LocalOptions, Needs, TracerKind};
+use crate::tracer::{BuildOptions, Kernel, LocalOptions, Needs, Tracer, TracerKind};
 
 /// Rules by which trees of influence areas are built.
 const LOCAL_RULES: [HeuristicChoice; 3] = [HeuristicChoice::Sah, HeuristicChoice::Pah, HeuristicChoice::PahSpfh];
@@ -40,29 +40,22 @@ struct Contestant {
 
 /// All builders that take part for rays of a distribution.
 fn contestants(rays: Option<&RayDistribution>) -> Vec<Contestant> {
-    let preset = |(name, preset): (&str, BuildPreset)| Contestant {
-        name: name.into(),
-        builder: Builder::Preset(preset),
-        is_turned: false,
-    };
-    let presets = [("fast", BuildPreset::Fast), ("default", BuildPreset::Default), ("best", BuildPreset::Best)];
-    let mut out: Vec<Contestant> = presets.map(preset).into();
+    let mut out = Vec::new();
+    let mut add = |name: &str, builder, is_turned| out.push(Contestant { name: name.to_owned(), builder, is_turned });
+    for (name, preset) in [("fast", BuildPreset::Fast), ("default", BuildPreset::Default), ("best", BuildPreset::Best)]
+    {
+        add(name, Builder::Preset(preset), false);
+    }
     for choice in HeuristicChoice::ALL.into_iter().filter(|c| rays.is_some() || !c.needs_rays()) {
-        let builder = Builder::Heuristic(choice.heuristic(rays.copied().unwrap_or_default()));
-        out.push(Contestant { name: choice.name().into(), builder, is_turned: false });
+        add(choice.name(), Builder::Heuristic(choice.heuristic(rays.copied().unwrap_or_default())), false);
     }
     if let Some(RayDistribution::Parallel(_)) = rays {
         // in the frame of the rays
         let along_z = RayDistribution::Parallel(DVec3::Z);
         for choice in [HeuristicChoice::Sah, HeuristicChoice::SahSpfh, HeuristicChoice::PahSpfh] {
-            let builder = Builder::Heuristic(choice.heuristic(along_z));
-            out.push(Contestant { name: format!("{}, turned", choice.name()), builder, is_turned: true });
+            add(&format!("{}, turned", choice.name()), Builder::Heuristic(choice.heuristic(along_z)), true);
         }
-        out.push(Contestant {
-            name: "default, turned".into(),
-            builder: Builder::Preset(BuildPreset::Default),
-            is_turned: true,
-        });
+        add("default, turned", Builder::Preset(BuildPreset::Default), true);
     }
     out
 }
@@ -90,14 +83,7 @@ pub fn scene(session: &mut BuilderSession, source: &str) -> Result<()> {
     for (k, stream) in streams.iter().enumerate() {
         // the rays' distribution is found, not told
         let areas = areas_of_rays(&stream.name, &stream.rays, &bounds);
-        let distribution = match areas.as_slice() {
-            [] => None,
-            [one] => Some(one.rays),
-            [first, ..] => match first.rays {
-                RayDistribution::View(view) => Some(RayDistribution::Point(view.eye)),
-                other => Some(other),
-            },
-        };
+        let distribution = distribution_of(&areas);
         let turned = match distribution {
             Some(RayDistribution::Parallel(d)) => Some(turned(&scene, d)),
             _ => None,
@@ -279,14 +265,9 @@ fn rates(
     if session.args.counts {
         return Ok(None);
     }
-    let tracer = session.device.tracer(flat, TracerKind::Compute, Needs::default(), Kernel::Nearest, build)?;
-    let narrow = |r: &LabRay| Ray {
-        origin: r.origin.as_vec3().to_array(),
-        tmin: r.tmin as f32,
-        direction: r.direction.as_vec3().to_array(),
-        tmax: r.tmax as f32,
-    };
-    let rays: Vec<Ray> = stream.rays.iter().map(narrow).collect();
+    let (needs, kernel) = (Needs::default(), Kernel::Nearest.into());
+    let tracer = Tracer::with_build(&session.device, TracerKind::Compute, flat, needs, kernel, build)?;
+    let rays: Vec<Ray> = stream.rays.iter().map(|r| Ray::new(r.origin, r.direction, [r.tmin, r.tmax])).collect();
     let mode = if stream.query == Query::Any { Mode::Any } else { Mode::Closest };
     let mut prepared = PreparedRays::new(&tracer, &rays, mode)?;
     let mut rates = Vec::new();

@@ -13,26 +13,19 @@ use crate::output::parse_size;
 use crate::realtime::Preset;
 use crate::renderer::frames::is_ambient_occlusion;
 use crate::settings::Capability;
+use crate::tracer::BuildOptions;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 
-/// Default image size, pixels.
-const DEFAULT_SIZE: [u32; 2] = [160, 90];
-/// The default with `--quick`.
-const QUICK_SIZE: [u32; 2] = [64, 36];
-/// Default frames of a run: some are left after the 64 that flicker has to end.
-const DEFAULT_FRAMES: u32 = 72;
-/// The default with `--quick`.
-const QUICK_FRAMES: u32 = 16;
-/// Default samples per pixel of the reference of a still camera.
-const DEFAULT_REFERENCE_PATHS: u32 = 1024;
-/// The default with `--quick`.
-const QUICK_REFERENCE_PATHS: u32 = 128;
+/// Default image size, pixels, and with `--quick`.
+const SIZE: [[u32; 2]; 2] = [[160, 90], [64, 36]];
+/// Default frames of a run, and with `--quick`: some are left after the 64 that flicker has to end.
+const FRAMES: [u32; 2] = [72, 16];
+/// Default samples per pixel of the reference of a still camera, and with `--quick`.
+const REFERENCE_PATHS: [u32; 2] = [1024, 128];
 /// Share of a still reference's paths for frames in motion, whose errors and number are larger.
 const MOVING_SHARE: f64 = 0.25;
-/// Default timed updates of each acceleration structure.
-const DEFAULT_REPEATS: u32 = 9;
-/// The default with `--quick`.
-const QUICK_REPEATS: u32 = 3;
+/// Default timed updates of each acceleration structure, and with `--quick`.
+const REPEATS: [u32; 2] = [9, 3];
 
 /// A part of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -276,7 +269,7 @@ impl BenchFramesArgs {
 
     /// Image size, pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
+        self.common.setting(self.size, SIZE)
     }
 
     /// Width over height.
@@ -285,19 +278,25 @@ impl BenchFramesArgs {
         f64::from(width) / f64::from(height)
     }
 
+    /// Build options of a hierarchy for images of this size.
+    pub fn build_options(&self, [width, height]: [u32; 2]) -> BuildOptions {
+        let rays = u64::from(width) * u64::from(height) * u64::from(self.reference_paths());
+        BuildOptions { preset: self.build.preset(), rays, ..Default::default() }
+    }
+
     /// Frames of a run.
     pub fn frames(&self) -> u32 {
-        self.common.setting(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
+        self.common.setting(self.frames, FRAMES)
     }
 
     /// Timed updates of each acceleration structure.
     pub fn repeats(&self) -> u32 {
-        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, REPEATS)
     }
 
     /// Samples per pixel of the reference of a still camera.
     pub fn reference_paths(&self) -> u32 {
-        self.common.setting(self.reference_paths, DEFAULT_REFERENCE_PATHS, QUICK_REFERENCE_PATHS)
+        self.common.setting(self.reference_paths, REFERENCE_PATHS)
     }
 
     /// Samples per pixel of the reference of a frame in motion.
@@ -308,18 +307,11 @@ impl BenchFramesArgs {
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-
-    #[derive(Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: BenchFramesArgs,
-    }
+    use crate::settings::parse::parse_args;
 
     fn parse(extra: &[&str]) -> BenchFramesArgs {
-        Alone::try_parse_from([&["bench"], extra].concat()).unwrap().args
+        parse_args(extra).unwrap()
     }
 
     #[test]
@@ -336,7 +328,7 @@ mod tests {
         let occlusion = parse(&[]).of_ambient_occlusion();
         assert!(!occlusion.wants(Part::Bounces) && occlusion.wants(Part::Rest) && occlusion.wants_still());
         assert!(!parse(&["--series", "rays"]).wants_views());
-        assert!(Alone::try_parse_from(["bench", "--series", "rays", "--parts", "still"]).is_err());
+        assert!(parse_args::<BenchFramesArgs>(&["--series", "rays", "--parts", "still"]).is_err());
     }
 
     #[test]

@@ -48,11 +48,9 @@ pub fn measure(session: &mut FramesSession) -> Result<()> {
     let scenes = if args.common.quick { &SCENES[..QUICK] } else { &SCENES };
     for (k, scene) in scenes.iter().enumerate() {
         session.advance(k as f64 / scenes.len() as f64);
-        if session.is_over() {
-            session.leave_out(&format!("bounces: {}", scene.source));
+        if !session.has_time_for(format!("bounces: {}", scene.source)) {
             continue;
         }
-        session.phase(format!("bounces: {}", scene.source));
         measure_scene(session, scene, candidate)?;
         session.show_scene(scene.source)?;
     }

@@ -150,11 +150,9 @@ fn measure_presets(
         if candidate.preset == Preset::Reference {
             continue;
         }
-        if session.is_over() {
-            session.leave_out(&format!("{scene}, {part}: {}", candidate.name));
+        if !session.has_time_for(format!("{scene}, {part}: {}", candidate.name)) {
             continue;
         }
-        session.phase(format!("{scene}, {part}: {}", candidate.name));
         runs.push(measure_preset(session, scene, stage, change, candidate, &mut apply)?);
     }
     if runs.is_empty() {

@@ -32,18 +32,11 @@ pub fn measured(frames: u32) -> Vec<u32> {
 /// Passes of a frame that trace and average samples.
 const SAMPLING: [&str; 6] = ["path_camera", "path_bounce", "path_shadow", "path_gather", "ao_trace", "gather"];
 
-/// Times of a pass, or of one step of several launches of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PassTime {
-    pub pass: String,
-    /// Device time over the timed frames, milliseconds.
-    pub ms: Percentiles,
-}
-
 /// Cost of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameCost {
-    pub passes: Vec<PassTime>,
+    /// Passes, and their times on the device over the timed frames, milliseconds.
+    pub passes: Vec<(String, Percentiles)>,
     /// All passes, on the device; 0 where the device has no clock.
     pub device_ms: Percentiles,
     /// By the clock of the process, submission included.
@@ -69,9 +62,9 @@ impl FrameCost {
 
     /// Share of device time in passes that trace and average new samples, if it is known.
     pub fn sampling_share(&self) -> Option<f64> {
-        let is_sampling = |p: &&PassTime| SAMPLING.contains(&p.pass.as_str());
-        let sampling: f64 = self.passes.iter().filter(is_sampling).map(|p| p.ms.median).sum();
-        let all: f64 = self.passes.iter().map(|p| p.ms.median).sum();
+        let is_sampling = |(pass, _): &&(String, Percentiles)| SAMPLING.contains(&pass.as_str());
+        let sampling: f64 = self.passes.iter().filter(is_sampling).map(|(_, ms)| ms.median).sum();
+        let all: f64 = self.passes.iter().map(|(_, ms)| ms.median).sum();
         (sampling > 0.0).then(|| sampling / all)
     }
 
@@ -82,8 +75,8 @@ impl FrameCost {
         row.exact(quantity::CAMERA_RAYS, self.camera_rays).exact(quantity::RAYS, self.rays);
         row.exact(plain("skipped rays", ""), (self.skipped_rays > 0.0).then_some(self.skipped_rays));
         let mut row = record.row(scene, &format!("{part}, passes"), contestant);
-        for pass in &self.passes {
-            row.repeated(plain(&pass.pass, "ms"), pass.ms);
+        for (pass, ms) in &self.passes {
+            row.repeated(plain(pass, "ms"), *ms);
         }
     }
 
@@ -197,7 +190,7 @@ fn cost_of(frames: &[&TimedFrame]) -> FrameCost {
             // a frame that has no need of it says nothing about it
             here.reduce(|a, b| a + b)
         };
-        PassTime { pass: name.to_owned(), ms: ms(&mut frames.iter().copied().filter_map(of_frame)) }
+        (name.to_owned(), ms(&mut frames.iter().copied().filter_map(of_frame)))
     };
     FrameCost {
         passes: passes.iter().map(|name| of_pass(name)).collect(),
@@ -239,7 +232,7 @@ mod tests {
         };
         let log = FrameLog { frames: vec![lap(100.0), lap(1.0), lap(1.0), lap(2.0)] };
         let cost = log.cost(1);
-        let names: Vec<_> = cost.passes.iter().map(|p| (p.pass.as_str(), p.ms.median)).collect();
+        let names: Vec<_> = cost.passes.iter().map(|(pass, ms)| (pass.as_str(), ms.median)).collect();
         assert_eq!(names, [("gbuffer", 1.5), ("filter", 0.25)]);
         assert!((cost.device_ms.median - 1.75).abs() < 1e-12 && (cost.device_ms.p95 - 3.5).abs() < 1e-12);
         assert_eq!((log.rays(), cost.rays), (40, 10.0));
@@ -247,7 +240,7 @@ mod tests {
 
     #[test]
     fn the_share_of_samples() {
-        let pass = |pass: &str, ms: f64| PassTime { pass: pass.into(), ms: Percentiles::from_values(&[ms]).unwrap() };
+        let pass = |pass: &str, ms: f64| (pass.to_owned(), Percentiles::from_values(&[ms]).unwrap());
         let cost = FrameCost {
             passes: vec![pass("path_camera", 1.0), pass("path_bounce", 2.0), pass("filter", 1.0)],
             ..FrameCost::default()

@@ -22,7 +22,7 @@ pub use args::BenchFramesArgs;
 use args::{FalloffChoice, FramesSession, Part};
 
 use super::peers::file::{self, Measures, PeerSpec};
-use super::record::{BenchKind, Record};
+use super::record::BenchKind;
 use super::session::BenchSession;
 use crate::error::Result;
 use crate::terminal::console::Failure;
@@ -33,12 +33,12 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     // before anything that takes long
     let specs = if args.wants_peers() { file::choose(args.peers.as_deref(), Measures::Paths)? } else { Ok(Vec::new()) };
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
-    args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = BenchSession::start(args, &args.common, |device| {
+    let plan = args.common.check(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
+    let mut session = BenchSession::start(args, &args.common, plan, BenchKind::Frames, |device| {
         let [width, height] = args.size();
         let falloff = if args.ao_falloff == FalloffChoice::Binary { "binary" } else { "exponential" };
         let mut settings = vec![
-            ("tracer", args.tracer.on(device.info()).0.name().to_owned()),
+            ("tracer", args.tracer.on(device).0.name().to_owned()),
             ("integrator", args.integrator().name().to_owned()),
             ("size", format!("{width}x{height}")),
             ("frames", args.frames().to_string()),
@@ -47,8 +47,7 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
             ("reference paths", args.reference_paths().to_string()),
         ];
         settings.extend(args.is_occlusion().then(|| ("falloff", falloff.to_owned())));
-        let settings = settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-        Record { benchmark: BenchKind::Frames, host: device.host_info(), settings, ..Record::default() }
+        settings
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
@@ -58,8 +57,6 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
 /// All jobs. One that fails does not stop the others.
 fn measure(session: &mut FramesSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
     session.start_peers(specs)?;
-    session.record.peers = session.peer_titles();
-    session.show_title()?;
     let args = session.args;
     let views = if args.wants_views() { scenes } else { &[] };
     let (bounces, structures) = (args.wants(Part::Bounces), args.wants(Part::Structures));

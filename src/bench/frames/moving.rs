@@ -45,11 +45,9 @@ pub fn measure(session: &mut FramesSession, scene: &str, stage: &mut SceneStage,
     }
     let error = moments.iter().map(|m| m.reference.rmse).sum::<f64>() / moments.len().max(1) as f64;
     for (k, candidate) in session.args.candidates().into_iter().enumerate() {
-        if session.is_over() {
-            session.leave_out(&format!("{scene}, {part}: {}", candidate.name));
+        if !session.has_time_for(format!("{scene}, {part}: {}", candidate.name)) {
             continue;
         }
-        session.phase(format!("{scene}, {part}: {}", candidate.name));
         measure_preset(session, scene, stage, &mut motion, candidate, &moments)?;
         if k == 0 {
             session.record.row(scene, part, REFERENCE).exact(quantity::RMSE.not_compared(), error);

@@ -46,10 +46,9 @@ pub fn prepare(session: &mut FramesSession, loaded: &FramesScene, view: &CameraV
     for peer in 0..session.peers.len() {
         let name = session.peers[peer].spec.name.clone();
         session.phase(format!("{}: reference of {name}", loaded.name));
-        match prepare_peer(session, (loaded, view), peer) {
-            Ok(all) => images.extend(all),
-            Err(e) => leave_out(session, &format!("{}: peer '{name}'", loaded.name), e)?,
-        }
+        let prepared = prepare_peer(session, (loaded, view), peer);
+        let what = format!("{}: peer '{name}' left out", loaded.name);
+        images.extend(session.unless_peer_fails(&what, prepared)?.into_iter().flatten());
     }
     Ok(images)
 }
@@ -64,31 +63,20 @@ pub fn render_beside(
 ) -> Result<()> {
     for mut images in std::mem::take(all) {
         session.phase(format!("images of {}", images.title));
-        match images.render_in(&mut session.peers[images.peer], ms) {
-            Ok(rendered) => {
-                let contestant = format!("{} in the time of {preset}", images.title);
-                let mut row = session.record.row(scene, "still, other renderers", &contestant).of_peer(true);
-                let time = images.clock.time();
-                row.exact(plain("image", "ms"), time.per_image).exact(plain("path", "ms"), time.per_path);
-                row.exact(plain("reference's RMSE", ""), images.reference.rmse);
-                for (frame, image) in rendered {
-                    let mut at = row.at(FRAME, f64::from(frame));
-                    at.exact(quantity::RMSE.not_compared(), image.errors.rmse);
-                    at.exact(quantity::CORRECTED, image.errors.corrected)
-                        .exact(plain("paths", ""), f64::from(image.paths));
-                }
-                all.push(images);
-            }
-            Err(e) => leave_out(session, &images.title, e)?,
+        let rendered = images.render_in(&mut session.peers[images.peer], ms);
+        let what = format!("{} left out", images.title);
+        let Some(rendered) = session.unless_peer_fails(&what, rendered)? else { continue };
+        let contestant = format!("{} in the time of {preset}", images.title);
+        let mut row = session.record.row(scene, "still, other renderers", &contestant).of_peer(true);
+        let time = images.clock.time();
+        row.exact(plain("image", "ms"), time.per_image).exact(plain("path", "ms"), time.per_path);
+        row.exact(plain("reference's RMSE", ""), images.reference.rmse);
+        for (frame, image) in rendered {
+            let mut at = row.at(FRAME, f64::from(frame));
+            at.exact(quantity::RMSE.not_compared(), image.errors.rmse);
+            at.exact(quantity::CORRECTED, image.errors.corrected).exact(plain("paths", ""), f64::from(image.paths));
         }
-    }
-    Ok(())
-}
-
-fn leave_out(session: &mut FramesSession, what: &str, e: PeerError) -> Result<()> {
-    match e {
-        PeerError::Ours(e) => return Err(e),
-        PeerError::Failed(why) => session.note(format!("{what} left out: {why}")),
+        all.push(images);
     }
     Ok(())
 }

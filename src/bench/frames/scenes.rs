@@ -164,19 +164,12 @@ fn light(scene: &mut Scene, is_interior: bool, args: &BenchFramesArgs) -> Result
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-
-    #[derive(Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: BenchFramesArgs,
-    }
+    use crate::settings::parse::parse_args;
 
     #[test]
     fn every_scene_is_lit_and_has_something_to_go_round() {
-        let args = Alone::try_parse_from(["bench", "--quick"]).unwrap().args;
+        let args: BenchFramesArgs = parse_args(&["--quick"]).unwrap();
         for source in [INTERIOR, "builtin:parade", "builtin:cornell-box", ROOM] {
             check(source).unwrap();
             let loaded = load(source, &args).unwrap();
@@ -193,7 +186,7 @@ mod tests {
 
     #[test]
     fn any_scene_has_two_views_of_ambient_occlusion() {
-        let args = Alone::try_parse_from(["bench", "--quick"]).unwrap().args.of_ambient_occlusion();
+        let args = parse_args::<BenchFramesArgs>(&["--quick"]).unwrap().of_ambient_occlusion();
         let loaded = load("builtin:stairs", &args).unwrap();
         let names: Vec<_> = loaded.views.iter().map(|v| v.name.as_str()).collect();
         assert_eq!(names, ["builtin:stairs, near", "builtin:stairs, far"]);

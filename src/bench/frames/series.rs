@@ -44,8 +44,7 @@ pub fn measure(session: &mut FramesSession, series: Series, scenes: &[String]) -
 
     // Measures the first view of each scene, at one or all sizes.
     for (k, source) in sources.iter().enumerate() {
-        if k > 0 && session.is_over() {
-            session.leave_out(source);
+        if !session.has_time_for(source.clone()) {
             continue;
         }
         session.advance(k as f64 / sources.len() as f64);

@@ -155,11 +155,10 @@ impl<'a> SceneStage<'a> {
         // the tracer
         let (args, camera) = (session.args, &view.camera);
         let signal = Signal::new(args, size, loaded.reach, bounces)?;
-        let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(args.reference_paths());
-        let build =
-            BuildOptions { preset: args.build.preset(), rays, streams: signal.streams()?, ..Default::default() };
-        let (kind, _) = args.tracer.on(session.device.info());
-        let tracer = session.device.tracer(flat, kind, signal.needs()?, ComputeOptions::default(), &build)?;
+        let build = BuildOptions { streams: signal.streams()?, ..args.build_options(size) };
+        let (kind, _) = args.tracer.on(&session.device.info);
+        let (needs, options) = (signal.needs()?, ComputeOptions::default());
+        let tracer = Tracer::with_build(&session.device, kind, flat, needs, options, &build)?;
 
         // the time of images of paths; the first ones compile
         let mut sampler = signal.sampler(&tracer, flat, camera)?;

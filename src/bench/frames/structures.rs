@@ -10,7 +10,7 @@ use crate::measure::stats::Percentiles;
 use crate::report::thousands;
 use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
-use crate::tracer::{BuildOptions, Changes, ComputeOptions, MeshChange, Needs, Tracer};
+use crate::tracer::{Changes, ComputeOptions, MeshChange, Needs, Tracer};
 
 /// 15 meshes as in Larsen's work, and one of their mean size: 25.2 M triangles by 15.
 const SCENES: [&str; 2] = ["builtin:instances:25000000", "builtin:terrain:1680000"];
@@ -28,8 +28,7 @@ const MESH: usize = 0;
 pub fn measure(session: &mut FramesSession) -> Result<()> {
     let sources = if session.args.common.quick { QUICK } else { SCENES };
     for (k, source) in sources.into_iter().enumerate() {
-        if session.is_over() {
-            session.leave_out(&format!("structures of {source}"));
+        if !session.has_time_for(format!("structures of {source}")) {
             continue;
         }
         session.advance(k as f64 / sources.len() as f64);
@@ -45,11 +44,10 @@ fn measure_scene(session: &mut FramesSession, source: &str) -> Result<()> {
     let scene = load::load(source)?;
     let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![MESH], ..Motion::default() };
     let flat = FlatScene::with_motion(&scene, motion)?;
-    let (kind, _) = session.args.tracer.on(session.device.info());
-    let [width, height] = session.args.size();
-    let rays = u64::from(width) * u64::from(height) * u64::from(session.args.reference_paths());
-    let build = BuildOptions { preset: session.args.build.preset(), rays, ..Default::default() };
-    let mut tracer = session.device.tracer(&flat, kind, Needs::default(), ComputeOptions::default(), &build)?;
+    let build = session.args.build_options(session.args.size());
+    let (kind, _) = session.args.tracer.on(&session.device.info);
+    let (needs, options) = (Needs::default(), ComputeOptions::default());
+    let mut tracer = Tracer::with_build(&session.device, kind, &flat, needs, options, &build)?;
     let Some(Geometry::Triangles(mesh)) = scene.meshes.get(MESH).map(|m| &m.geometry) else {
         return Err(Error::Scene(format!("{source}: its first mesh has no triangles to deform")));
     };

@@ -48,8 +48,7 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
     let flat = FlatScene::with_motion_and_blend(scene, motion, args.integrator().get().blend())?;
 
     for (k, view) in loaded.views.iter().enumerate() {
-        if session.is_over() {
-            session.leave_out(&view.name);
+        if !session.has_time_for(view.name.clone()) {
             continue;
         }
         session.phase(format!("{}: building", view.name));
@@ -102,17 +101,13 @@ fn fill<'a>(
     }
     for (k, motion) in motions.into_iter().enumerate() {
         session.advance(share(k as f64 + 1.0));
-        if session.is_over() {
-            session.leave_out(&format!("{}, {}", view.name, motion.name()));
-            continue;
+        if session.has_time_for(format!("{}, {}", view.name, motion.name())) {
+            moving::measure(session, &view.name, stage, motion)?;
         }
-        moving::measure(session, &view.name, stage, motion)?;
     }
     if args.wants(Part::Change) {
         session.advance(share(steps - 1.0));
-        if session.is_over() {
-            session.leave_out(&format!("{}, changes", view.name));
-        } else {
+        if session.has_time_for(format!("{}, changes", view.name)) {
             change::measure(session, view, stage, loaded.mover)?;
         }
     }
@@ -139,11 +134,9 @@ fn measure_still(
     let mut beside = peers::prepare(session, loaded, view)?;
     let mut results = Vec::new();
     for candidate in args.candidates() {
-        if session.is_over() {
-            session.leave_out(&format!("{scene}, still: {}", candidate.name));
+        if !session.has_time_for(format!("{scene}, still: {}", candidate.name)) {
             continue;
         }
-        session.phase(format!("{scene}, still: {}", candidate.name));
         if args.wants_still() {
             results.push(still::measure(session, scene, stage, candidate, &reference, &mut beside)?);
         }

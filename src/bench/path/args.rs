@@ -12,18 +12,12 @@ use crate::output::parse_size;
 use crate::settings::parse::parse_seconds;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 
-/// Default image size, pixels.
-const DEFAULT_SIZE: [u32; 2] = [256, 256];
-/// The default with `--quick`.
-const QUICK_SIZE: [u32; 2] = [64, 64];
-/// Default timed images of each sample count.
-const DEFAULT_REPEATS: u32 = 5;
-/// The default with `--quick`.
-const QUICK_REPEATS: u32 = 2;
-/// Default target seconds of the longest image.
-const DEFAULT_SECONDS: f64 = 4.0;
-/// The default with `--quick`.
-const QUICK_SECONDS: f64 = 0.3;
+/// Default image size, pixels, and with `--quick`.
+const SIZE: [[u32; 2]; 2] = [[256, 256], [64, 64]];
+/// Default timed images of each sample count, and with `--quick`.
+const REPEATS: [u32; 2] = [5, 2];
+/// Default target seconds of the longest image, and with `--quick`.
+const SECONDS: [f64; 2] = [4.0, 0.3];
 /// Time of a reference relative to the longest image.
 const REFERENCE_SHARE: f64 = 15.0;
 
@@ -85,17 +79,17 @@ pub type PathSession<'a> = BenchSession<'a, BenchPathArgs>;
 impl BenchPathArgs {
     /// Image size, pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
+        self.common.setting(self.size, SIZE)
     }
 
     /// Timed images of each kind.
     pub fn repeats(&self) -> u32 {
-        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, REPEATS)
     }
 
     /// Target seconds of the longest image.
     pub fn seconds(&self) -> f64 {
-        self.common.setting(self.seconds.map(|d| d.as_secs_f64()), DEFAULT_SECONDS, QUICK_SECONDS)
+        self.common.setting(self.seconds.map(|d| d.as_secs_f64()), SECONDS)
     }
 
     /// Seconds for each reference.

@@ -42,45 +42,28 @@ pub struct ErrorCurve {
     pub longest_launch: Option<f64>,
 }
 
-/// Time at which an error is reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimeToError {
-    /// Wall seconds of one image.
-    pub seconds: f64,
-    /// How it was found.
-    pub estimate: TimeEstimate,
-}
-
-/// How a time was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TimeEstimate {
-    /// Interpolated between two measured images.
-    Between,
-    /// An upper bound: the shortest measured image is better already.
-    Less,
-    /// Extrapolated by the square root law from the longest measured image.
-    Extrapolated,
-}
+/// Quantities of a time to an error: interpolated between two measured images; an upper bound where
+/// the shortest one is better already; by the square root law from the longest one.
+const BETWEEN: &str = "time to the target";
+const AT_MOST: &str = "at most to the target";
+const EXTRAPOLATED: &str = "extrapolated to the target";
 
 impl ErrorCurve {
-    /// Time at which the error falls to `rmse`: interpolated, then as of independent samples.
-    pub fn time_to(&self, rmse: f64) -> Option<TimeToError> {
+    /// Wall seconds of an image at which the error falls to `rmse`, and the name of that quantity.
+    fn time_to(&self, rmse: f64) -> Option<(f64, &'static str)> {
         let points = self.points.iter().filter_map(|p| Some((median(&p.seconds)?, p.rmse)));
         let curve: Vec<(f64, f64)> = points.filter(|p| p.1.is_finite()).collect();
         let (first, last) = (curve.first()?, curve.last()?);
         if first.1 <= rmse {
-            return Some(TimeToError { seconds: first.0, estimate: TimeEstimate::Less });
+            return Some((first.0, AT_MOST));
         }
         let between = curve.windows(2).find(|w| w[0].1 > rmse && w[1].1 <= rmse).map(|w| {
             let [(t0, e0), (t1, e1)] = [w[0], w[1]];
             // no error at all is as good as the target
             let share = if e1 > 0.0 { (e0 / rmse).ln() / (e0 / e1).ln() } else { 1.0 };
-            TimeToError { seconds: t0 * (t1 / t0).powf(share), estimate: TimeEstimate::Between }
+            (t0 * (t1 / t0).powf(share), BETWEEN)
         });
-        between.or_else(|| {
-            let seconds = last.0 * (last.1 / rmse).powi(2);
-            (rmse > 0.0).then_some(TimeToError { seconds, estimate: TimeEstimate::Extrapolated })
-        })
+        between.or_else(|| (rmse > 0.0).then(|| (last.0 * (last.1 / rmse).powi(2), EXTRAPOLATED)))
     }
 
     /// Adds all of it to a record, with how long it takes to the error of `target`.
@@ -111,14 +94,9 @@ impl ErrorCurve {
         let Some(rmse) = target.points.last().map(|p| p.rmse).filter(|rmse| *rmse > 0.0 && rmse.is_finite()) else {
             return;
         };
-        let Some(time) = self.time_to(rmse) else { return };
-        let name = match time.estimate {
-            TimeEstimate::Between => "time to the target",
-            TimeEstimate::Less => "at most to the target",
-            TimeEstimate::Extrapolated => "extrapolated to the target",
-        };
-        row.exact(plain(name, "s"), time.seconds);
-        row.exact(plain("times as long", ""), target.time_to(rmse).map(|base| time.seconds / base.seconds));
+        let Some((seconds, name)) = self.time_to(rmse) else { return };
+        row.exact(plain(name, "s"), seconds);
+        row.exact(plain("times as long", ""), target.time_to(rmse).map(|(base, _)| seconds / base));
     }
 }
 
@@ -136,14 +114,13 @@ mod tests {
         // error 1 / sqrt(t)
         let c = curve("x", &[(1.0, 1.0), (4.0, 0.5), (16.0, 0.25)]);
         let at = |rmse| c.time_to(rmse).unwrap();
-        assert!((at(0.7).seconds - 1.0 / 0.49).abs() < 1e-9 && at(0.7).estimate == TimeEstimate::Between);
-        assert!((at(0.125).seconds - 64.0).abs() < 1e-9 && at(0.125).estimate == TimeEstimate::Extrapolated);
-        assert_eq!(at(2.0), TimeToError { seconds: 1.0, estimate: TimeEstimate::Less });
-        assert_eq!(at(0.25), TimeToError { seconds: 16.0, estimate: TimeEstimate::Between });
+        assert!((at(0.7).0 - 1.0 / 0.49).abs() < 1e-9 && at(0.7).1 == BETWEEN);
+        assert!((at(0.125).0 - 64.0).abs() < 1e-9 && at(0.125).1 == EXTRAPOLATED);
+        assert_eq!([at(2.0), at(0.25)], [(1.0, AT_MOST), (16.0, BETWEEN)]);
         assert_eq!(curve("x", &[]).time_to(1.0), None);
         // one that is exact in the end
         let exact = curve("x", &[(1.0, 1.0), (2.0, 0.0)]);
-        assert_eq!(exact.time_to(0.5), Some(TimeToError { seconds: 2.0, estimate: TimeEstimate::Between }));
+        assert_eq!(exact.time_to(0.5), Some((2.0, BETWEEN)));
         // beside one that sets the target
         let mut record = Record::default();
         curve("slow", &[(4.0, 1.0), (64.0, 0.25)]).add_to(&mut record, "a", Some(&c));

@@ -17,7 +17,7 @@ use scenes::PathScene;
 
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::record::{BenchKind, REFERENCE, Record, plain, quantity};
+use super::record::{BenchKind, REFERENCE, plain, quantity};
 use super::scenes::table_name;
 use super::session::BenchSession;
 use crate::accel::flatten::FlatScene;
@@ -29,7 +29,7 @@ use crate::measure::metrics::ImagePair;
 use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt;
-use crate::tracer::{BuildOptions, ComputeOptions, Needs};
+use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer};
 
 /// Paths of a pixel in one image at most.
 const MAX_SPP: u32 = 1 << 16;
@@ -44,16 +44,10 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     // before anything that takes long
     let specs = file::choose(args.peers.as_deref(), Measures::Paths)?;
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
-    args.common.check_inputs(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
-    let mut session = BenchSession::start(args, &args.common, |device| Record {
-        benchmark: BenchKind::Path,
-        host: device.host_info(),
-        settings: [
-            ("tracer".to_owned(), args.tracer.on(device.info()).0.name().to_owned()),
-            ("size".to_owned(), format!("{}x{}", args.size()[0], args.size()[1])),
-        ]
-        .into(),
-        ..Record::default()
+    let plan = args.common.check(&scenes.sources, args.environment.as_deref(), args.peers.as_deref())?;
+    let mut session = BenchSession::start(args, &args.common, plan, BenchKind::Path, |device| {
+        let [width, height] = args.size();
+        vec![("tracer", args.tracer.on(device).0.name().to_owned()), ("size", format!("{width}x{height}"))]
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
@@ -63,8 +57,6 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
 /// All scenes. One that fails does not stop the others.
 fn measure(session: &mut PathSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
     session.start_peers(specs)?;
-    session.record.peers = session.peer_titles();
-    session.show_title()?;
     session.expect_jobs(scenes.len());
     scenes.iter().try_for_each(|source| session.job(source, |session| session.scene(source)))
 }
@@ -87,8 +79,8 @@ impl PathSession<'_> {
             ..Default::default()
         };
         let needs = Needs { shading: true, ..Default::default() };
-        let (kind, _) = args.tracer.on(self.device.info());
-        let tracer = self.device.tracer(&flat, kind, needs, ComputeOptions::default(), &build)?;
+        let (kind, _) = args.tracer.on(&self.device.info);
+        let tracer = Tracer::with_build(&self.device, kind, &flat, needs, ComputeOptions::default(), &build)?;
         let own = |strategy| -> Result<Engine> {
             let options =
                 PathOptions { samples: SampleSettings::new(size, MAX_SPP, 0), strategy, ..PathOptions::default() };
@@ -104,19 +96,13 @@ impl PathSession<'_> {
         }
         let mut baseline = contestants.first().map(|c| c.name.clone());
         for k in 0..self.peers.len() {
-            match self.peer_contestants(k, (&name, &loaded), size, &mut references) {
-                Ok(theirs) => {
-                    if let (0, Some(first)) = (k, theirs.first()) {
-                        baseline = Some(first.name.clone());
-                    }
-                    contestants.extend(theirs);
-                }
-                Err(PeerError::Ours(e)) => return Err(e),
-                Err(PeerError::Failed(why)) => {
-                    let peer = &self.peers[k].spec.name;
-                    self.note(format!("{name}: peer '{peer}' left out: {why}"));
-                }
+            let theirs = self.peer_contestants(k, (&name, &loaded), size, &mut references);
+            let what = format!("{name}: peer '{}' left out", self.peers[k].spec.name);
+            let theirs = self.unless_peer_fails(&what, theirs)?.unwrap_or_default();
+            if let (0, Some(first)) = (k, theirs.first()) {
+                baseline = Some(first.name.clone());
             }
+            contestants.extend(theirs);
         }
         self.rounds(&name, &mut contestants, &references)?;
         let curves: Vec<ErrorCurve> = contestants.into_iter().map(|c| c.finish(size, &references)).collect();

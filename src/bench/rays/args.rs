@@ -10,13 +10,10 @@ use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::BuildChoice;
 
-/// Default rays of a set: an image of 1280x720.
-const DEFAULT_RAYS: u32 = 1280 * 720;
-/// The default with `--quick`: 320x180.
-const QUICK_RAYS: u32 = 320 * 180;
-/// Default timed repeats.
-const DEFAULT_REPEATS: u32 = 7;
-const QUICK_REPEATS: u32 = 3;
+/// Default rays of a set, of an image; and with `--quick`.
+const RAYS: [u32; 2] = [1280 * 720, 320 * 180];
+/// Default timed repeats, and with `--quick`.
+const REPEATS: [u32; 2] = [7, 3];
 
 const EXAMPLES: &str = "\
 Examples:
@@ -104,17 +101,17 @@ impl BenchRaysArgs {
 
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
-        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, REPEATS)
     }
 
     /// Rays of all closed meshes together, with [`BenchRaysArgs::edges`].
     pub fn edge_rays(&self) -> usize {
-        self.common.setting(self.rays, DEFAULT_RAYS, QUICK_RAYS) as usize
+        self.common.setting(self.rays, RAYS) as usize
     }
 
     /// Pixels of the image whose rays are traced: 16:9, multiples of 8.
     pub fn size(&self) -> [u32; 2] {
-        let rays = f64::from(self.common.setting(self.rays, DEFAULT_RAYS, QUICK_RAYS));
+        let rays = f64::from(self.common.setting(self.rays, RAYS));
         let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
         let width = side((rays * 16.0 / 9.0).sqrt());
         // exactly the requested number where the factors allow it
@@ -127,19 +124,12 @@ impl BenchRaysArgs {
 mod tests {
     use std::path::Path;
 
-    use clap::Parser;
-
     use super::*;
     use crate::accel::BuildPreset;
-
-    #[derive(Debug, Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: BenchRaysArgs,
-    }
+    use crate::settings::parse::parse_args;
 
     fn parse(extra: &[&str]) -> BenchRaysArgs {
-        Alone::try_parse_from([&["bench"], extra].concat()).unwrap().args
+        parse_args(extra).unwrap()
     }
 
     #[test]
@@ -173,8 +163,7 @@ mod tests {
         );
         assert_eq!(parse(&["--json", "A.JSON", "scene"]).common.outputs.json_file().unwrap(), Path::new("A.JSON"));
         // a record takes no scene's place
-        assert!(
-            Alone::try_parse_from(["bench", "--json", "scene.glb"]).unwrap_err().to_string().contains("ends in .json")
-        );
+        let refused = parse_args::<BenchRaysArgs>(&["--json", "scene.glb"]).unwrap_err();
+        assert!(refused.to_string().contains("ends in .json"));
     }
 }

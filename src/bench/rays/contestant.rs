@@ -1,11 +1,12 @@
 //! Contestants: our own tracers and kernels, and those of peers, behind one interface.
 
+use std::sync::Arc;
+
 use crate::accel::flatten::FlatScene;
-use crate::bench::device::BenchDevice;
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::gpu::DeviceInfo;
+use crate::gpu::{Device, DeviceInfo};
 use crate::integrators::ray_sets::{RaySet, sample};
 use crate::integrators::rays::{Mode, PreparedRays};
 use crate::ray::{Hit, Ray};
@@ -28,6 +29,10 @@ const fn compute(kernel: Kernel, name: &'static str, divisor: usize, max_primiti
     OwnKernel { name, tracer: TracerKind::Compute, kernel, divisor, max_primitives }
 }
 
+const fn hardware(tracer: TracerKind, name: &'static str) -> OwnKernel {
+    OwnKernel { name, tracer, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 }
+}
+
 /// All kernels. The first supported one generates the rays, and the others are checked against it.
 pub const KERNELS: [OwnKernel; 7] = [
     compute(Kernel::Wide, "wide", 1, usize::MAX),
@@ -35,14 +40,8 @@ pub const KERNELS: [OwnKernel; 7] = [
     compute(Kernel::Nearest, "nearest", 4, 1 << 22),
     compute(Kernel::Direction, "direction", 4, 1 << 22),
     compute(Kernel::Brute, "brute", 64, 2000),
-    OwnKernel {
-        name: "pipeline",
-        tracer: TracerKind::Pipeline,
-        kernel: Kernel::Wide,
-        divisor: 16,
-        max_primitives: 1 << 21,
-    },
-    OwnKernel { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 },
+    hardware(TracerKind::Pipeline, "pipeline"),
+    hardware(TracerKind::Query, "query"),
 ];
 
 impl OwnKernel {
@@ -98,8 +97,8 @@ pub struct Contestant<'a> {
 }
 
 impl<'a> Contestant<'a> {
-    pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
-        let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
+    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
+        let tracer = Tracer::with_build(device, own.tracer, flat, Needs::default(), own.kernel.into(), build)?;
         let stats = tracer.stats();
         let build = BuildCost {
             seconds: stats.build_seconds,
@@ -107,7 +106,7 @@ impl<'a> Contestant<'a> {
             bytes_per_primitive: stats.bytes_per_primitive(),
             sah_cost: stats.sah_cost,
         };
-        let divisor = if device.info().is_cpu() { own.divisor } else { 1 };
+        let divisor = if device.info.is_cpu() { own.divisor } else { 1 };
         Ok(Self {
             name: own.name.to_owned(),
             build,
@@ -206,25 +205,19 @@ enum PreparedEngine<'c> {
     Peer { peer: usize, kernel: &'c str, set: &'static str, mode: Mode, hits: u64 },
 }
 
-/// Seconds of one repeat.
-pub struct RepeatTime {
-    /// On the device, or by the peer's own clock.
-    pub device: f64,
-    /// By our clock; `None` for peers.
-    pub wall: Option<f64>,
-}
-
 impl PreparedRun<'_> {
-    pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<RepeatTime, PeerError> {
+    /// Traces once. Returns the seconds on the device, or by the peer's own clock, and those by our
+    /// clock; `None` for peers.
+    pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<(f64, Option<f64>), PeerError> {
         match &mut self.engine {
             PreparedEngine::Own(prepared) => {
                 let (device, wall) = prepared.pass(control)?;
-                Ok(RepeatTime { device, wall: Some(wall) })
+                Ok((device, Some(wall)))
             }
             PreparedEngine::Peer { peer, kernel, set, mode, hits } => {
                 let (seconds, found) = peers[*peer].trace(kernel, *mode, set)?;
                 *hits = found;
-                Ok(RepeatTime { device: seconds, wall: None })
+                Ok((seconds, None))
             }
         }
     }

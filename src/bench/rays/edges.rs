@@ -88,11 +88,9 @@ impl RaySession<'_> {
         }
         for (done, contestant) in contestants.iter().enumerate() {
             self.phase(format!("{name}: '{}'", contestant.name));
-            match self.edges_by(contestant, &oracle, &rays, &truth) {
-                Ok(counts) => add_counts(found, counts),
-                Err(PeerError::Ours(e)) => return Err(e),
-                Err(PeerError::Failed(why)) => self.note(format!("{name}: '{}' left out: {why}", contestant.name)),
-            }
+            let counts = self.edges_by(contestant, &oracle, &rays, &truth);
+            let counts = self.unless_peer_fails(&format!("{name}: '{}' left out", contestant.name), counts)?;
+            counts.into_iter().for_each(|counts| add_counts(found, counts));
             interrupt::check()?;
             self.advance((done + 1) as f64 / contestants.len() as f64);
         }
@@ -108,7 +106,7 @@ impl RaySession<'_> {
     ) -> Result<EdgeCounts, PeerError> {
         let own = contestant.tracer();
         let is_watertight = own.is_some_and(|t| t.kind() == TracerKind::Compute);
-        let is_slow = own.is_some() && !is_watertight && self.device.info().is_cpu();
+        let is_slow = own.is_some() && !is_watertight && self.device.info.is_cpu();
         let count = if is_slow { rays.len().div_ceil(SLOW) } else { rays.len() };
         let (rays, truth) = (&rays[..count], &truth[..count]);
         let missed = |hits: &[Hit]| hits.iter().filter(|h| !h.is_hit()).count() as u64;

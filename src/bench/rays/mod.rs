@@ -12,7 +12,7 @@ mod streams;
 pub use args::BenchRaysArgs;
 use args::RaySession;
 use check::Check;
-use contestant::{Contestant, KERNELS, PreparedRun, RepeatTime};
+use contestant::{Contestant, KERNELS, PreparedRun};
 use edges::EdgeCounts;
 use scenes::RayScene;
 use streams::{STREAMS, StreamKind};
@@ -20,7 +20,7 @@ use streams::{STREAMS, StreamKind};
 use super::chart;
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::record::{BenchKind, Record, SIZE, plain, quantity};
+use super::record::{BenchKind, SIZE, plain, quantity};
 use super::scenes::check_exists;
 use super::session::BenchSession;
 use crate::accel::flatten::FlatScene;
@@ -54,10 +54,8 @@ struct Findings {
 }
 
 /// The results of a contestant with a stream.
-struct StreamRun {
-    name: String,
-    is_peers: bool,
-    is_wide: bool,
+struct StreamRun<'c> {
+    contestant: &'c Contestant<'c>,
     rays: f64,
     hit_share: f64,
     seconds: Vec<f64>,
@@ -70,16 +68,10 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
-    args.common.check_inputs(&scenes.sources, None, args.peers.as_deref())?;
-    let mut session = BenchSession::start(args, &args.common, |device| Record {
-        benchmark: BenchKind::Rays,
-        host: device.host_info(),
-        settings: [
-            ("rays".to_owned(), format!("{}x{}", args.size()[0], args.size()[1])),
-            ("build".to_owned(), args.build.name().to_owned()),
-        ]
-        .into(),
-        ..Record::default()
+    let plan = args.common.check(&scenes.sources, None, args.peers.as_deref())?;
+    let mut session = BenchSession::start(args, &args.common, plan, BenchKind::Rays, |_| {
+        let [width, height] = args.size();
+        vec![("rays", format!("{width}x{height}")), ("build", args.build.name().to_owned())]
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let mut findings = Findings::default();
@@ -99,8 +91,6 @@ fn measure(
     session.start_peers(specs)?;
     let specs = session.peers.iter().map(|p| &p.spec);
     findings.baselines = specs.flat_map(|s| s.baselines.iter().map(|k| s.title_of(k))).collect();
-    session.record.peers = session.peer_titles();
-    session.show_title()?;
     if session.args.edges {
         return session.edges(&mut findings.edges);
     }
@@ -212,13 +202,14 @@ impl RaySession<'_> {
             let visits = counter.as_ref().map(|c| c.mean(&some, stream.mode == Mode::Any));
             let size = (loaded.scene.triangle_count() + loaded.scene.sphere_count()) as f64;
             // ratios are to each baseline that ran, or else to the first contestant
-            let is_named = |run: &&StreamRun| findings.baselines.contains(&run.name);
+            let is_named = |run: &&StreamRun| findings.baselines.contains(&run.contestant.name);
             let mut bases: Vec<&StreamRun> = runs.iter().filter(is_named).collect();
             if bases.is_empty() && runs.len() > 1 {
                 bases.extend(runs.first());
             }
             for run in &runs {
-                let mut row = self.record.row(source, stream.name, &run.name).of_peer(run.is_peers);
+                let Contestant { name, kernel, .. } = run.contestant;
+                let mut row = self.record.row(source, stream.name, name).of_peer(run.contestant.peer_index().is_some());
                 let mut row = row.at(SIZE, size);
                 let rates = |seconds: &[f64]| {
                     Percentiles::from_values(&seconds.iter().map(|s| run.rays / s / 1e6).collect::<Vec<_>>())
@@ -229,9 +220,9 @@ impl RaySession<'_> {
                 // round by round
                 for base in &bases {
                     let ratio = paired_ratio(&run.seconds, run.rays, &base.seconds, base.rays);
-                    row.exact(plain(&format!("x {}", base.name), ""), ratio);
+                    row.exact(plain(&format!("x {}", base.contestant.name), ""), ratio);
                 }
-                let visits = visits.filter(|_| run.is_wide);
+                let visits = visits.filter(|_| *kernel == Some(Kernel::Wide));
                 row.exact(quantity::NODES, visits.map(|v| v.nodes));
                 row.exact(plain("leaves a ray", ""), visits.map(|v| v.leaves));
             }
@@ -274,7 +265,7 @@ impl RaySession<'_> {
                 continue;
             }
             self.phase(format!("{source}: building for '{}'", own.name));
-            let made = match own.takes_part(self.device.info(), flat, named) {
+            let made = match own.takes_part(&self.device.info, flat, named) {
                 Ok(()) => Contestant::own(&self.device, flat, own, &self.args.build_options()),
                 Err(why) => Err(Error::Device(why)),
             };
@@ -305,11 +296,9 @@ impl RaySession<'_> {
                 self.peers[index].load_geometry(flat)?;
                 spec.kernels.iter().map(|k| Contestant::peer(&mut self.peers, index, k, flat)).collect()
             };
-            match build() {
-                Ok(list) => out.extend(list),
-                Err(PeerError::Ours(e)) => return Err(e),
-                Err(PeerError::Failed(why)) => self.note(format!("{source}: peer '{}' left out: {why}", spec.name)),
-            }
+            let built = build();
+            let built = self.unless_peer_fails(&format!("{source}: peer '{}' left out", spec.name), built)?;
+            out.extend(built.into_iter().flatten());
         }
         Ok(out)
     }
@@ -320,50 +309,42 @@ impl RaySession<'_> {
             if !contestants.iter().zip(&*failed).any(|(c, f)| !f && c.peer_index() == Some(index)) {
                 continue;
             }
-            match self.peers[index].load_rays(set.name(), rays) {
-                Ok(()) => {}
-                Err(PeerError::Ours(e)) => return Err(e),
-                Err(PeerError::Failed(why)) => {
-                    self.note(format!("peer '{}' left out: {why}", self.peers[index].spec.name));
-                    contestants.iter().zip(&mut *failed).for_each(|(c, f)| *f |= c.peer_index() == Some(index));
-                }
+            let loaded = self.peers[index].load_rays(set.name(), rays);
+            let what = format!("peer '{}' left out", self.peers[index].spec.name);
+            if self.unless_peer_fails(&what, loaded)?.is_none() {
+                contestants.iter().zip(&mut *failed).for_each(|(c, f)| *f |= c.peer_index() == Some(index));
             }
         }
         Ok(())
     }
 
     /// Measures one stream in rounds: each contestant traces once per round.
-    fn stream(
+    fn stream<'c>(
         &mut self,
-        contestants: &[Contestant],
+        contestants: &'c [Contestant<'c>],
         failed: &mut [bool],
         stream: &StreamKind,
         rays: &[Ray],
         [from, to]: [f64; 2],
-    ) -> Result<Vec<StreamRun>> {
+    ) -> Result<Vec<StreamRun<'c>>> {
         let mut runs: Vec<PreparedRun> = Vec::new();
         for c in contestants {
             runs.push(c.prepare(stream.set, rays, stream.mode)?);
         }
 
         // Traces in rounds, without contestants that have failed.
-        let mut times: Vec<Vec<RepeatTime>> = contestants.iter().map(|_| Vec::new()).collect();
+        let mut times: Vec<Vec<(f64, Option<f64>)>> = contestants.iter().map(|_| Vec::new()).collect();
         let repeats = self.args.repeats();
         for round in 0..=repeats {
             for (k, run) in runs.iter_mut().enumerate() {
                 if failed[k] || !contestants[k].is_for(stream.set) {
                     continue;
                 }
-                match run.repeat(&mut self.peers, &mut self.control) {
-                    // the first round compiles, finds launch sizes and fills caches
-                    Ok(time) if round > 0 => times[k].push(time),
-                    Ok(_) => {}
-                    Err(PeerError::Ours(e)) => return Err(e),
-                    Err(PeerError::Failed(why)) => {
-                        failed[k] = true;
-                        self.note(format!("'{}' left out from here: {why}", contestants[k].name));
-                    }
-                }
+                let time = run.repeat(&mut self.peers, &mut self.control);
+                let time = self.unless_peer_fails(&format!("'{}' left out from here", contestants[k].name), time)?;
+                failed[k] = time.is_none();
+                // the first round compiles, finds launch sizes and fills caches
+                times[k].extend(time.filter(|_| round > 0));
             }
             interrupt::check()?;
             self.advance(from + (to - from) * f64::from(round) / f64::from(repeats));
@@ -383,13 +364,11 @@ impl RaySession<'_> {
             }
             let rays = runs[k].rays as f64;
             results.push(StreamRun {
-                name: contestant.name.clone(),
-                is_peers: contestant.peer_index().is_some(),
-                is_wide: contestant.kernel == Some(Kernel::Wide),
+                contestant,
                 rays,
                 hit_share: runs[k].hit_count()? as f64 / rays,
-                seconds: times[k].iter().map(|t| t.device).collect(),
-                wall_seconds: times[k].iter().map(|t| t.wall).collect(),
+                seconds: times[k].iter().map(|t| t.0).collect(),
+                wall_seconds: times[k].iter().map(|t| t.1).collect(),
             });
         }
         Ok(results)
@@ -426,7 +405,9 @@ impl RaySession<'_> {
                 continue;
             }
             let rays = sets.get(stream.set);
-            let ours = into_own_result(reference.hits(&mut self.peers, rays, stream.mode, &mut self.control))?;
+            let ours = reference.hits(&mut self.peers, rays, stream.mode, &mut self.control);
+            // our own contestants fail with errors of ours only
+            let ours = ours.map_err(|e| e.into_error(&reference.name))?;
             for (k, contestant) in contestants.iter().enumerate() {
                 if k == first || failed[k] || !contestant.is_for(stream.set) {
                     continue;
@@ -442,18 +423,15 @@ impl RaySession<'_> {
                         Ok(named)
                     })
                 };
-                match compare() {
-                    Ok(found) => {
-                        let names = [source, stream.name, &contestant.name, &reference.name];
-                        let check = Check::new(names, &found, contestant.strict);
-                        check.add_to(&mut self.record);
-                        findings.checks.push(check);
-                    }
-                    Err(PeerError::Ours(e)) => return Err(e),
-                    Err(PeerError::Failed(why)) => {
-                        failed[k] = true;
-                        self.note(format!("'{}' left out of the check from here: {why}", contestant.name));
-                    }
+                let found = compare();
+                let what = format!("'{}' left out of the check from here", contestant.name);
+                if let Some(found) = self.unless_peer_fails(&what, found)? {
+                    let names = [source, stream.name, &contestant.name, &reference.name].map(str::to_owned);
+                    let check = Check { names, found, strict: contestant.strict };
+                    check.add_to(&mut self.record);
+                    findings.checks.push(check);
+                } else {
+                    failed[k] = true;
                 }
                 interrupt::check()?;
                 self.advance(1.0 - CHECK_SHARE + CHECK_SHARE * (done * contestants.len() + k + 1) as f64 / pairs);
@@ -461,12 +439,4 @@ impl RaySession<'_> {
         }
         Ok(())
     }
-}
-
-/// Our own contestants fail with errors of ours only.
-fn into_own_result<T>(result: Result<T, PeerError>) -> Result<T> {
-    result.map_err(|e| match e {
-        PeerError::Ours(e) => e,
-        PeerError::Failed(why) => Error::CheckFailed(why),
-    })
 }

@@ -161,17 +161,22 @@ fn section(fit: &FitRecord) -> Section {
     Section::new(title(fit), parts)
 }
 
-fn chart(fit: &FitRecord) -> Chart {
+/// Errors over the radius, a series for each falloff. An infinite radius has no place among them.
+pub fn error_curves(fit: &FitRecord, mark: Mark) -> Vec<Series> {
     let series = fit.curves.iter().map(|curve| Series {
         name: curve.half_distance.map_or_else(|| "binary".into(), |half| format!("halves every {}", significant(half))),
-        mark: Mark::Line,
+        mark,
         points: curve.radii.iter().zip(&curve.rmse).filter_map(|(r, e)| Some(Point::from(((*r)?, *e)))).collect(),
     });
+    series.collect()
+}
+
+fn chart(fit: &FitRecord) -> Chart {
     Chart {
         title: "Error over radius".into(),
         caption: "Root mean squared error with the best ambient radiance for each radius and falloff.".into(),
         x: Axis::logarithmic("AO radius, scene units"),
         y: Axis::linear("RMSE"),
-        series: series.collect(),
+        series: error_curves(fit, Mark::Line),
     }
 }

@@ -221,11 +221,6 @@ struct AoEstimator {
     launched: [u64; 2],
 }
 
-/// The streams that [`render`] traces.
-pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
-    rays::streams(options.occlusion)
-}
-
 /// Renders ambient occlusion. [`accumulate`](crate::film::accumulate) says when it stops.
 ///
 /// # Errors

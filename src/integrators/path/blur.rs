@@ -78,19 +78,11 @@ fn direction([x, y]: [usize; 2], [width, height]: [usize; 2]) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    use glam::DMat3;
-
     use super::*;
 
     fn map(width: u32, height: u32, radiance: impl Fn(u32, u32) -> Vec3) -> EnvironmentMap {
-        EnvironmentMap {
-            name: String::new(),
-            width,
-            height,
-            radiance: (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| radiance(x, y)).collect(),
-            factor: Vec3::ONE,
-            to_map: DMat3::IDENTITY,
-        }
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        EnvironmentMap::new("", [width, height], texels.map(|(x, y)| radiance(x, y)).collect())
     }
 
     #[test]

@@ -126,14 +126,7 @@ mod tests {
     use super::*;
 
     fn map(width: u32, radiance: &[Vec3]) -> EnvironmentMap {
-        EnvironmentMap {
-            name: String::new(),
-            width,
-            height: radiance.len() as u32 / width,
-            radiance: radiance.into(),
-            factor: Vec3::ONE,
-            to_map: DMat3::IDENTITY,
-        }
+        EnvironmentMap::new("", [width, radiance.len() as u32 / width], radiance.into())
     }
 
     #[test]

@@ -122,11 +122,6 @@ impl<'r> Interactive<'r> {
         self.scene
     }
 
-    /// Name of the scene: a file, or `builtin:NAME`.
-    pub fn name(&self) -> &'r str {
-        self.name
-    }
-
     /// The device.
     pub fn device(&self) -> &'r Arc<Device> {
         self.device

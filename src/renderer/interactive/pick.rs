@@ -36,13 +36,8 @@ pub struct Pick {
 /// # Errors
 /// Those of the device.
 pub fn closest_hits(tracer: &Tracer, origin: DVec3, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<Hit>>> {
-    let traced = |(from, direction): &(DVec3, DVec3)| Ray {
-        origin: (*from - origin).as_vec3().to_array(),
-        tmin: 0.0,
-        direction: direction.as_vec3().to_array(),
-        tmax: f32::INFINITY,
-    };
-    let traced: Vec<Ray> = rays.iter().map(traced).collect();
+    let traced = rays.iter().map(|(from, direction)| Ray::new(*from - origin, *direction, [0.0, f64::INFINITY]));
+    let traced: Vec<Ray> = traced.collect();
     rays::check(&traced)?;
     let (hits, _) = rays::trace(tracer, &traced, Mode::Closest, 1, &mut NoControl)?;
     Ok(hits.into_iter().map(|hit| hit.t.is_finite().then_some(hit)).collect())

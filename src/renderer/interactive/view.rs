@@ -207,11 +207,6 @@ impl View {
         }
     }
 
-    /// The settings that it was created with.
-    pub fn settings(&self) -> &RenderSettings {
-        &self.settings
-    }
-
     /// Returns true for frames, which keep their histories in motion; a still starts anew.
     pub fn is_realtime(&self) -> bool {
         matches!(self.kind, Kind::Frames(_))

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::rays::camera_ray;
+use super::rays::view_rays;
 use super::{Survey, Trace, VisibleSurface, significant};
 use crate::error::{Error, Result};
 use crate::renderer::settings::CameraSettings;
@@ -358,16 +358,9 @@ fn is_body(scene: &Scene) -> bool {
     }
 }
 
-/// The rays of a view.
-fn view_rays(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
-    let [columns, rows] = VIEW;
-    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
-    (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
-}
-
 /// The surfaces that the rays of views hit.
 fn trace_views(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
-    let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(|c| view_rays(c, aspect)).collect();
+    let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(|c| view_rays(c, aspect, VIEW)).collect();
     Ok(trace(&rays)?.chunks_exact(VIEW[0] * VIEW[1]).map(<[_]>::to_vec).collect())
 }
 
@@ -416,7 +409,7 @@ fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Tra
         let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
         // long views of much, with nothing right before the camera; the sky is no view
         let sum: f64 = distances.iter().map(|d| d.sqrt()).sum();
-        let shown = (detail(&view_rays(camera, aspect), &seen, size) / ENOUGH_DETAIL).min(1.0);
+        let shown = (detail(&view_rays(camera, aspect, VIEW), &seen, size) / ENOUGH_DETAIL).min(1.0);
         let sum = (1.0 - flaws) * shown * sum;
         if nearest < 0.02 { 0.2 * sum } else { sum }
     };
@@ -548,7 +541,7 @@ mod tests {
 
     #[test]
     fn bare_walls_show_little() {
-        let rays = view_rays(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Y, 1.0), 1.0);
+        let rays = view_rays(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Y, 1.0), 1.0, VIEW);
         let wall = vec![hit(2.0); rays.len()];
         // planes across the view, each at a distance of its own
         let steps: Vec<_> = (0..rays.len())

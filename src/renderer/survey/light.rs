@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::framing::rounded;
-use super::rays::{camera_ray, clip};
+use super::rays::{clip, view_rays};
 use super::{Survey, significant};
 use crate::error::{Error, Result};
 use crate::integrators::lighting::LightingSettings;
@@ -17,7 +17,7 @@ const SUN: &str = "sun direction=0.45,-1,-0.7 irradiance=1.65 angle=5";
 /// Median irradiance in view of a closed room over pi: the radiance of white diffuse surfaces.
 const LAMP: f64 = 0.5;
 /// Rays through the image, along its width and height, that find what is in view.
-const VIEW: [usize; 2] = [24, 16];
+pub(super) const VIEW: [usize; 2] = [24, 16];
 
 /// Lights a scene without light, and names the light: sky and sun, or a lamp in a closed room.
 pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(LightingSettings, String)> {
@@ -29,7 +29,7 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     };
     // above the camera, so that there are shadows; the first direction is upwards
     let lamp = rounded(eye + DVec3::Y * (0.5 * walls[0]), survey.diagonal());
-    let views = views(camera, aspect);
+    let views = view_rays(camera, aspect, VIEW);
     let mut seen = survey.trace(&views)?;
     clip(camera, &views, &mut seen);
     // irradiance of each surface by a lamp of one candela, without shadows, and its reflectance
@@ -52,13 +52,6 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     let intensity = significant(intensity, 4);
     let text = format!("point position={},{},{} intensity={intensity}", lamp.x, lamp.y, lamp.z);
     Ok((LightingSettings { light: vec![parse(&text)?], ..Default::default() }, "a lamp above the camera".into()))
-}
-
-/// Rays through an image.
-pub(super) fn views(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
-    let [columns, rows] = VIEW;
-    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
-    (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
 }
 
 /// About how much light a material reflects, at most 0.9; half of its colour if it has a texture.

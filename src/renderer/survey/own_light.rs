@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::light::views;
-use super::rays::clip;
+use super::light::VIEW;
+use super::rays::{clip, view_rays};
 use super::{Survey, VisibleSurface};
 use crate::error::Result;
 use crate::sampling::sobol::{hash_combine, to_unit};
@@ -61,7 +61,7 @@ fn shows_view(survey: &Survey, camera: &Camera, aspect: f64) -> Result<bool> {
     if scene.environment != Environment::Black || !survey.is_small() {
         return Ok(true);
     }
-    let views = views(camera, aspect);
+    let views = view_rays(camera, aspect, VIEW);
     let mut seen = survey.trace(&views)?;
     clip(camera, &views, &mut seen);
     let place = |((from, direction), seen): (&(DVec3, DVec3), Option<VisibleSurface>)| {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::rays::{camera_ray, clip};
+use super::rays::{clip, view_rays};
 use super::{Trace, significant};
 use crate::error::Result;
 use crate::scene::Camera;
@@ -37,9 +37,7 @@ impl Openness {
 
 /// Measures how open the surfaces are that a camera sees, if any. `size`: of the scene.
 pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result<Option<Openness>> {
-    let [columns, rows] = VIEW;
-    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
-    let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
+    let views = view_rays(camera, aspect, VIEW);
     let mut seen = trace(&views)?;
     clip(camera, &views, &mut seen);
     let surfaces = views.iter().zip(seen).filter_map(|(ray, seen)| Some((ray, seen?)));

@@ -19,6 +19,12 @@ pub fn clip(camera: &Camera, rays: &[(DVec3, DVec3)], seen: &mut [Option<Visible
     }
 }
 
+/// Rays through the middles of an image's pixels, rows from the top.
+pub fn view_rays(camera: &Camera, aspect: f64, [columns, rows]: [usize; 2]) -> Vec<(DVec3, DVec3)> {
+    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
+    (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
+}
+
 /// Origin, on the near clipping plane, and unit direction in world space of the ray through a point
 /// of the image: `at` from (0, 0) at the top left to (1, 1). `aspect` is width over height.
 pub fn camera_ray(camera: &Camera, at: [f64; 2], aspect: f64) -> (DVec3, DVec3) {

@@ -1,8 +1,6 @@
 //! An environment map with a sun, in code.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use crate::scene::EnvironmentMap;
 
@@ -22,8 +20,7 @@ pub fn sun_map() -> EnvironmentMap {
         // half a degree across, and no less than a texel
         if d.dot(sun) > 0.4f64.to_radians().cos() { Vec3::new(1.0e4, 9.0e3, 7.0e3) } else { sky }
     };
-    let radiance: Arc<[Vec3]> = (0..width * height).map(texel).collect();
-    EnvironmentMap { name: "own sun map".into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY }
+    EnvironmentMap::new("own sun map", SIZE, (0..width * height).map(texel).collect())
 }
 
 #[cfg(test)]

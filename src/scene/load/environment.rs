@@ -6,7 +6,7 @@ mod cube;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DMat3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::picture;
@@ -55,14 +55,8 @@ pub fn load_environment_with(path: &Path, warn: &mut dyn FnMut(String)) -> Resul
     let Pixels { width, height, radiance, warning } =
         if path.is_dir() { cube::read(path, &budget)? } else { read(path, &budget)? };
     warning.into_iter().for_each(warn);
-    Ok(EnvironmentMap {
-        name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
-        width,
-        height,
-        radiance,
-        factor: Vec3::ONE,
-        to_map: DMat3::IDENTITY,
-    })
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok(EnvironmentMap::new(name, [width, height], radiance))
 }
 
 /// An environment map of the faces of a cube, each `side` texels along an edge, in the order of
@@ -83,7 +77,7 @@ pub(super) fn of_faces(
         Pixels { width: side, height: side, radiance, warning: None }
     };
     let Pixels { width, height, radiance, .. } = cube::resample(&faces.map(pixels));
-    Ok(EnvironmentMap { name: name.to_owned(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY })
+    Ok(EnvironmentMap::new(name, [width, height], radiance))
 }
 
 /// One image, of the kind that its first bytes show.

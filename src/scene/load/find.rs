@@ -1,5 +1,6 @@
 //! Search for files that are referenced by other files, possibly with paths of another machine.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -184,7 +185,7 @@ fn spellings(names: &[&str]) -> Vec<Vec<u8>> {
         add(text::bytes_of(name).into_owned());
         let slashes = name.replace('\\', "/");
         add(text::bytes_of(&slashes).into_owned());
-        add(percent_decoded(&text::bytes_of(&slashes)));
+        add(percent_decoded(&text::bytes_of(&slashes)).into_owned());
         if text::is_foreign(name) {
             add(text::shown(&slashes).into_bytes());
         }
@@ -192,8 +193,11 @@ fn spellings(names: &[&str]) -> Vec<Vec<u8>> {
     all
 }
 
-/// `%41` to `A`; what is no escape stays as it is.
-fn percent_decoded(bytes: &[u8]) -> Vec<u8> {
+/// `%41` to `A`; what is no valid escape stays as it is, since some exporters do not escape at all.
+pub(super) fn percent_decoded(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if !bytes.contains(&b'%') {
+        return bytes.into();
+    }
     let mut out = Vec::with_capacity(bytes.len());
     let mut i = 0;
     while i < bytes.len() {
@@ -202,7 +206,7 @@ fn percent_decoded(bytes: &[u8]) -> Vec<u8> {
         out.push(byte.unwrap_or(bytes[i]));
         i += if byte.is_some() { 3 } else { 1 };
     }
-    out
+    out.into()
 }
 
 /// The folders of a failed [`Finder::find`] as words.

@@ -155,7 +155,7 @@ fn harmonics(light: &ImageLight) -> Result<EnvironmentMap, String> {
         radiance.max(DVec3::ZERO).as_vec3().min(Vec3::splat(f32::MAX))
     };
     let radiance = (0..width * height).map(texel).collect();
-    Ok(EnvironmentMap { name: light.name.clone(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY })
+    Ok(EnvironmentMap::new(&light.name, [width, height], radiance))
 }
 
 /// The nine real spherical harmonics up to the second band, each over the factor by which the

@@ -9,6 +9,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
 use crate::scene::load::confine;
+use crate::scene::load::find::percent_decoded;
 
 /// Target of a URI.
 pub(super) enum Uri {
@@ -46,7 +47,7 @@ pub(super) fn is_data(uri: &str) -> bool {
 pub(super) fn parse(uri: &str) -> Result<Uri, String> {
     if let Some(rest) = strip_prefix(uri.trim_start(), "data:") {
         let (head, data) = rest.split_once(',').ok_or("has a data URI without a comma")?;
-        let data = percent_decode(data.as_bytes());
+        let data = percent_decoded(data.as_bytes());
         let is_base64 = head.rsplit(';').next().is_some_and(|last| last.trim().eq_ignore_ascii_case("base64"));
         if !is_base64 {
             return Ok(Uri::Data(data.into_owned()));
@@ -81,11 +82,11 @@ fn file_path(rest: &str) -> &str {
 /// absolute path of another machine last, as a file name beside the glTF file.
 fn paths(uri: &str) -> Result<Vec<PathBuf>, String> {
     let decoded =
-        String::from_utf8(percent_decode(uri.as_bytes()).into_owned()).map_err(|_| "has a URI that is not UTF-8")?;
+        String::from_utf8(percent_decoded(uri.as_bytes()).into_owned()).map_err(|_| "has a URI that is not UTF-8")?;
     let slashes = decoded.replace('\\', "/");
     let mut names = vec![slashes.clone(), decoded, uri.replace('\\', "/"), uri.to_owned()];
     if let Some(end) = uri.find(['?', '#']) {
-        let cut = String::from_utf8(percent_decode(&uri.as_bytes()[..end]).into_owned());
+        let cut = String::from_utf8(percent_decoded(&uri.as_bytes()[..end]).into_owned());
         names.extend(cut.map(|cut| cut.replace('\\', "/")));
     }
     let is_absolute = |name: &str| name.starts_with('/') || name.as_bytes().get(1) == Some(&b':');
@@ -136,33 +137,13 @@ fn standard_base64(text: &[u8]) -> Cow<'_, [u8]> {
     text.iter().filter_map(standard).collect()
 }
 
-/// `%41` to `A`; what is no valid escape stays as it is, since some exporters do not escape at all.
-fn percent_decode(bytes: &[u8]) -> Cow<'_, [u8]> {
-    if !bytes.contains(&b'%') {
-        return bytes.into();
-    }
-    let mut out = Vec::with_capacity(bytes.len());
-    let mut i = 0;
-    while i < bytes.len() {
-        let escape = (bytes[i] == b'%')
-            .then(|| bytes.get(i + 1..i + 3))
-            .flatten()
-            .filter(|hex| hex.iter().all(u8::is_ascii_hexdigit))
-            .and_then(|hex| std::str::from_utf8(hex).ok())
-            .and_then(|hex| u8::from_str_radix(hex, 16).ok());
-        out.push(escape.unwrap_or(bytes[i]));
-        i += if escape.is_some() { 3 } else { 1 };
-    }
-    out.into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn data_as_exporters_write_it() {
-        assert_eq!(&*percent_decode(b"a%20b%2Fc%zz%"), b"a b/c%zz%");
+        assert_eq!(&*percent_decoded(b"a%20b%2Fc%zz%"), b"a b/c%zz%");
         for uri in [
             "data:application/octet-stream;base64,aGk=",
             "data:;base64,aGk",
