@@ -63,6 +63,10 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
 
+    /// The same, of work whose finished parts are kept; the text says how it goes on.
+    #[error("interrupted: {0}")]
+    Paused(String),
+
     /// A check that skylit was asked to make did not hold (tracers disagree, images differ).
     #[error("{0}")]
     CheckFailed(String),
@@ -88,7 +92,7 @@ impl Error {
             Error::OutOfMemory(_) => 5,
             Error::DeviceLost(_) => 6,
             Error::Usage(_) => 64,
-            Error::Interrupted => 130,
+            Error::Interrupted | Error::Paused(_) => 130,
         }
     }
 

@@ -44,6 +44,8 @@ pub struct KeptParts {
     has_surfaces: bool,
     /// Where the next record begins; `None` once all records have been read.
     next: Option<u64>,
+    /// Parts that were read or added.
+    count: usize,
 }
 
 impl KeptParts {
@@ -65,7 +67,7 @@ impl KeptParts {
         // a file that was just made
         if header.is_empty() {
             file.write_all(&whole).map_err(failed)?;
-            return Ok(Self { path: path.to_owned(), file, has_surfaces, next: None });
+            return Ok(Self { path: path.to_owned(), file, has_surfaces, next: None, count: 0 });
         }
 
         // one that is there must be of this bake
@@ -79,7 +81,7 @@ impl KeptParts {
                 path.display()
             )));
         }
-        Ok(Self { path: path.to_owned(), file, has_surfaces, next: Some(length) })
+        Ok(Self { path: path.to_owned(), file, has_surfaces, next: Some(length), count: 0 })
     }
 
     /// The file.
@@ -101,6 +103,7 @@ impl KeptParts {
         match self.read(rows)? {
             Some((part, length)) => {
                 self.next = Some(at + length);
+                self.count += 1;
                 Ok(Some(part))
             }
             // what an interruption left of the last record is written again
@@ -163,9 +166,20 @@ impl KeptParts {
         let hash = hash_of(&record, &body);
         record.extend(hash.to_le_bytes());
         record.append(&mut body);
-        self.file
-            .write_all(&record)
-            .map_err(|e| Error::Output { path: self.path.clone(), message: format!("no part can be kept: {e}") })
+        let failed = |e| Error::Output { path: self.path.clone(), message: format!("no part can be kept: {e}") };
+        self.file.write_all(&record).map_err(failed)?;
+        self.count += 1;
+        Ok(())
+    }
+
+    /// The error of the bake, which says after an interruption that the same command goes on.
+    pub fn explain(&self, error: Error) -> Error {
+        let parts = match (error, self.count) {
+            (Error::Interrupted, 1) => "the finished part".to_owned(),
+            (Error::Interrupted, count @ 2..) => format!("the {count} finished parts"),
+            (error, _) => return error,
+        };
+        Error::Paused(format!("the same command goes on with {parts} in {}", self.path.display()))
     }
 
     /// Removes the file, once the output is written.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::cage::{Cage, CageFrames};
+use super::cage::{Detailed, Projector, SimplePoint};
 use super::frames::{SurfaceFrames, SurfacePoint};
 use super::kept::{KeptParts, Part};
 use super::light::LightTracer;
@@ -17,8 +17,7 @@ use super::{BakeSettings, Map, SeamTreatment, Space, backfaces, fill};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::integrators::rays::{Mode, PreparedRays};
-use crate::ray::{Hit, Ray};
+use crate::ray::Hit;
 use crate::scene::Scene;
 use crate::tracer::Tracer;
 
@@ -96,8 +95,8 @@ pub struct Traced<'a> {
     pub tracer: &'a Tracer,
     /// The scene as the tracer has it.
     pub flat: &'a FlatScene<'a>,
-    /// Where the surfaces of a detailed model are looked for; `None`: surfaces are their own.
-    pub cage: Option<Cage<'a>>,
+    /// How the surfaces of a detailed model are looked for; `None`: surfaces are their own.
+    pub detailed: Option<Detailed<'a>>,
 }
 
 /// A texture whose texels are being sampled.
@@ -227,7 +226,7 @@ fn map_of_sums(
     }
 
     // edges whose sides lie apart
-    if let Some(lookups) = SeamLookups::find(scene, texture, settings) {
+    if let Some(lookups) = SeamLookups::find(scene, texture, settings, &map.covered) {
         if settings.seams == SeamTreatment::Match {
             lookups.equalize(&mut map.values, settings.map);
         }
@@ -309,8 +308,8 @@ struct Baker<'a> {
     frames: Vec<Option<SurfaceFrames<'a>>>,
     /// The meshes of a detailed model.
     detailed: Vec<Option<SurfaceFrames<'a>>>,
-    /// Where rays to it start.
-    cage: Option<CageFrames<'a>>,
+    /// What finds points of it.
+    projector: Option<Projector<'a>>,
     /// Rays out of the surface, and into it.
     outward: Option<PointTracer<'a>>,
     inward: Option<PointTracer<'a>>,
@@ -341,7 +340,7 @@ impl<'a> Baker<'a> {
         let light = has_light.then(|| LightTracer::new(traced.tracer, traced.flat, settings, sample_bits));
         let needs_tangents = settings.map.is_vector() && settings.space == Space::Tangent;
         let tracer = traced.tracer;
-        let meshes = traced.cage.map_or(0, |_| traced.scene.meshes.len());
+        let meshes = traced.detailed.map_or(0, |_| traced.scene.meshes.len());
         Ok(Self {
             scene,
             traced,
@@ -349,7 +348,7 @@ impl<'a> Baker<'a> {
             settings,
             frames: texture.surfaces.iter().map(|s| SurfaceFrames::new(scene, s, needs_tangents)).collect(),
             detailed: (0..meshes).map(|mesh| SurfaceFrames::of_mesh(traced.scene, mesh)).collect(),
-            cage: traced.cage.map(CageFrames::new),
+            projector: traced.detailed.map(|detailed| Projector::new(detailed, tracer, traced.flat.origin)),
             outward: if is_outward { Some(PointTracer::new(tracer, sampling(false))?) } else { None },
             inward: if is_inward { Some(PointTracer::new(tracer, sampling(true))?) } else { None },
             light: light.transpose()?,
@@ -361,7 +360,7 @@ impl<'a> Baker<'a> {
     /// Adds points to their texels; returns how many texels are inside of other geometry.
     fn add(&mut self, points: &[TexelPoint], texels: &mut [TexelSums], control: &mut dyn Control) -> Result<usize> {
         let mut sampled = self.sampled_points(points);
-        if self.traced.cage.is_some() {
+        if self.traced.detailed.is_some() {
             sampled = self.project(sampled, control)?;
         }
         let width = self.texture.size[0];
@@ -472,29 +471,30 @@ impl<'a> Baker<'a> {
         sampled
     }
 
-    /// Moves points onto the detailed model: from the cage through the point and as far behind it.
-    /// Those that meet nothing are left out.
+    /// Moves points onto the detailed model. Those that meet nothing are left out.
     fn project(&self, sampled: Vec<Sampled>, control: &mut dyn Control) -> Result<Vec<Sampled>> {
-        let mut rays = Vec::with_capacity(sampled.len());
-        for sample in &sampled {
-            let (Some(surface), Some(cage)) = (self.surface_point(sample), &self.cage) else { return Ok(Vec::new()) };
-            let (start, direction, length) = cage.ray(&surface, &sample.point, sample.instance);
-            rays.push(Ray {
-                origin: (start - self.traced.flat.origin).as_vec3().to_array(),
-                tmin: 0.0,
-                direction: direction.as_vec3().to_array(),
-                tmax: length as f32,
-            });
-        }
-        if rays.is_empty() {
-            return Ok(Vec::new());
-        }
-        let mut set = PreparedRays::new(self.traced.tracer, &rays, Mode::Closest)?;
-        set.pass(control)?;
-        let moved = sampled.into_iter().zip(set.hits()?).filter(|(_, hit)| hit.is_hit()).map(|(sample, hit)| {
-            let Hit { instance, primitive, u, v, .. } = hit;
-            Sampled { record: BakePoint { instance, primitive, u, v, ..sample.record }, ..sample }
-        });
+        let (Some(projector), Some(detailed)) = (&self.projector, self.traced.detailed) else { return Ok(sampled) };
+        let point_of = |sample: &Sampled| {
+            let TexelPoint { surface, triangle, barycentrics, .. } = sample.point;
+            let uv = || {
+                let [a, b, c] = self.texture.surfaces[surface as usize].corners[triangle as usize];
+                a + barycentrics.x * (b - a) + barycentrics.y * (c - a)
+            };
+            Some(SimplePoint {
+                surface: self.surface_point(sample)?,
+                triangle: triangle as usize,
+                barycentrics,
+                instance: sample.instance,
+                skew: detailed.skew.at(uv),
+            })
+        };
+        let Some(points) = sampled.iter().map(point_of).collect::<Option<Vec<_>>>() else { return Ok(Vec::new()) };
+        let moved = sampled.into_iter().zip(projector.project(&points, control)?).filter(|(_, hit)| hit.is_hit()).map(
+            |(sample, hit)| {
+                let Hit { instance, primitive, u, v, .. } = hit;
+                Sampled { record: BakePoint { instance, primitive, u, v, ..sample.record }, ..sample }
+            },
+        );
         Ok(moved.collect())
     }
 
@@ -506,7 +506,7 @@ impl<'a> Baker<'a> {
 
     /// The point that is sampled: of the surface, or of the detailed model.
     fn traced_point(&self, sample: &Sampled) -> Option<SurfacePoint> {
-        if self.traced.cage.is_none() {
+        if self.traced.detailed.is_none() {
             return self.surface_point(sample);
         }
         let BakePoint { instance, primitive, u, v, .. } = sample.record;

@@ -25,6 +25,7 @@ pub mod picture;
 pub mod plan;
 pub mod seams;
 pub mod session;
+pub mod skew;
 pub mod smooth;
 pub mod texels;
 pub mod trace;

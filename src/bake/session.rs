@@ -6,11 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 use xxhash_rust::xxh3::Xxh3;
 
-use super::cage::{Cage, Detailed};
+use super::cage::{Cage, Detailed, Projector};
 use super::kept::KeptParts;
 use super::map::{BakedMap, TextureBake, Traced};
 use super::plan::{PlannedTexture, meshes_by_material};
-use super::vertices::{self, BakedVertices};
+use super::skew::Skew;
+use super::vertices::{BakedVertices, VertexBaker};
 use super::{BakeSettings, Map, Occluders};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
@@ -80,7 +81,7 @@ impl BakeSession<'_> {
         let share = u64::from(self.settings.spp) << 20;
         self.with_each(&groups, share, control, |flat, tracer, nth, control| {
             let (number, material) = jobs[nth];
-            let traced = Traced { scene: flat.scene, tracer, flat, cage: self.detailed.map(|d| d.cage) };
+            let traced = Traced { scene: flat.scene, tracer, flat, detailed: self.detailed };
             let begin = || TextureBake::new(self.scene, &planned[number], self.settings);
             let mut bake = under_way.take().unwrap_or_else(begin);
             bake.sample(traced, material, kept.as_deref_mut(), control)?;
@@ -117,6 +118,13 @@ impl BakeSession<'_> {
         if let Some(Cage::Distance(distance)) = cage {
             add(&mut hash, &distance.to_bits().to_string());
         }
+        if let Some(detailed) = self.detailed {
+            add(&mut hash, &format!("{:?}", detailed.behind.map(f64::to_bits)));
+            match detailed.skew {
+                Skew::Uniform(share) => add(&mut hash, &share.to_bits().to_string()),
+                Skew::Map(map) => hash.update(map.texture().texels.as_bytes()),
+            }
+        }
 
         // textures
         for texture in planned {
@@ -144,10 +152,10 @@ impl BakeSession<'_> {
             meshes_by_material(self.scene).into_iter().map(|(_, meshes)| meshes).filter(named).collect();
         let share = u64::from(self.settings.spp) << 16;
         self.with_each(&groups, share, control, |flat, tracer, nth, control| {
+            let projector = self.detailed.map(|detailed| Projector::new(detailed, tracer, flat.origin));
+            let baker = VertexBaker { scene: self.scene, tracer, file, settings: self.settings, projector };
             for &mesh in &groups[nth] {
-                if let Some((vertices, traced)) =
-                    vertices::bake(flat.scene, tracer, file, mesh, self.settings, control)?
-                {
+                if let Some((vertices, traced)) = baker.bake(mesh, control)? {
                     baked.push(vertices);
                     rays += traced;
                 }

@@ -18,6 +18,7 @@ use crate::bake::picture::{self, Bits};
 use crate::bake::plan::{PlannedTexture, plan};
 use crate::bake::seams::Seams;
 use crate::bake::session::BakeSession;
+use crate::bake::skew::{self, Skew, SkewMap};
 use crate::bake::{Map, Occluders, SeamTreatment, Target, agreement, document, pack, udim};
 use crate::error::{Error, Result};
 use crate::files;
@@ -43,6 +44,8 @@ const EXAMPLES: &str = "Examples:
 
 /// Largest number of samples of a triangle's corner.
 const MAX_CORNER_SPP: u32 = 1024;
+/// Distance of the cage where none is given, as a share of the scene's diagonal.
+const DEFAULT_CAGE: f64 = 0.02;
 
 /// `skylit bake`.
 #[derive(Clone, Debug, Args)]
@@ -68,11 +71,19 @@ pub struct BakeArgs {
     /// Maps show what lies within --cage of a texel along its normal.
     #[arg(long, value_name = "MODEL", value_hint = ValueHint::FilePath)]
     pub from: Option<String>,
-    /// Distance on both sides within which --from is looked for, or a model as cage [default: 2%]
+    /// Distance from the surface at which rays to --from start, or a model as cage [default: 2%]
     ///
-    /// The model is an inflated copy of this one, with the same triangles in the same order. Rays start at its surface, go through that of this one, and end as far behind.
+    /// The model is an inflated copy of this one, with the same triangles in the same order. Rays start at its surface, go through that of this one, and end behind it as --cage-behind says.
     #[arg(long, value_name = "D|PERCENT%|MODEL", value_parser = str::parse::<CageArg>, requires = "from")]
     pub cage: Option<CageArg>,
+    /// Distance behind the surface at which rays to --from end [default: as far as in front of it]
+    #[arg(long, value_name = "D|PERCENT%", value_parser = str::parse::<Length>, requires = "from")]
+    pub cage_behind: Option<Length>,
+    /// How straight rays to --from are: 0 along the cage, 1 along the triangles' normals [default: 0]
+    ///
+    /// A number, or a grey image in the texture coordinates that are baked into: black is 0, white is 1. Along a distance as cage rays follow shading normals, which slant details on flat faces beside hard edges.
+    #[arg(long, value_name = "0..1|IMAGE", value_parser = str::parse::<SkewArg>, requires = "from")]
+    pub skew: Option<SkewArg>,
     /// Bake a texture for each instance of a mesh
     ///
     /// In a model each instance after the first gets a copy of the mesh, which shares its vertices, and of its materials. Images are NAME-1.png, NAME-2.png: the first shows the first instance of each mesh, the second the second of those that have one, and so on.
@@ -153,6 +164,28 @@ impl FromStr for CageArg {
     }
 }
 
+/// The value of `--skew`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SkewArg {
+    /// The same everywhere, from 0 to 1.
+    Uniform(f64),
+    /// That of an image.
+    Image(PathBuf),
+}
+
+impl FromStr for SkewArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_image = || skew::FORMATS.iter().any(|format| files::has_extension(Path::new(text), format));
+        match text.parse::<f64>() {
+            Ok(share) if (0.0..=1.0).contains(&share) => Ok(Self::Uniform(share)),
+            Err(_) if is_image() => Ok(Self::Image(text.into())),
+            _ => Err("expected a number from 0 to 1, or an image (.png, .jpg, .tga, .exr and others)".to_owned()),
+        }
+    }
+}
+
 /// Whether a text names a model, by its extension.
 fn is_model(text: &str) -> bool {
     is_scene_file(text) || text.starts_with("builtin:")
@@ -174,6 +207,14 @@ impl BakeArgs {
     fn cage_model(&self) -> Option<&str> {
         match &self.cage {
             Some(CageArg::Model(path)) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// The image of the skew.
+    fn skew_image(&self) -> Option<&Path> {
+        match &self.skew {
+            Some(SkewArg::Image(path)) => Some(path),
             _ => None,
         }
     }
@@ -222,15 +263,23 @@ fn check(args: &BakeArgs) -> Result<Output> {
         ),
         (is_image && to_vertices, "--to vertices: an image has no vertices; write a model, .glb or .gltf"),
         (
-            args.from.is_some() && (to_vertices || args.occluders != [OccludersArg::Scene(Occluders::Scene)]),
-            "--from is for textures, and what it names occludes",
+            args.from.is_some() && args.occluders != [OccludersArg::Scene(Occluders::Scene)],
+            "--occluders: what --from names occludes, and nothing else",
         ),
         (
             args.occluders.iter().filter(|o| matches!(o, OccludersArg::Scene(_))).count() > 1,
             "--occluders: scene or material, not both, and any number of models",
         ),
         (args.unique_instances && to_vertices, "--unique-instances is for textures: instances share their vertices"),
-        (matches!(args.cage, Some(CageArg::Distance(Length::Auto))), "--cage: a length or a share is expected"),
+        (
+            matches!(args.cage, Some(CageArg::Distance(length)) if !is_finite(length)),
+            "--cage: a length or a share is expected",
+        ),
+        (args.cage_behind == Some(Length::Auto), "--cage-behind: a length or a share is expected"),
+        (
+            to_vertices && args.skew_image().is_some(),
+            "--skew: an image is for textures: give a number from 0 to 1 with --to vertices",
+        ),
         (
             args.what.target_error.is_some() && to_vertices,
             "--target-error is for textures of what rays sample, but for light",
@@ -276,6 +325,7 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     }
     args.occluding_models().for_each(|model| files_plan.reads("--occluders", model));
     args.cage_model().iter().for_each(|cage| files_plan.reads("--cage", cage));
+    args.skew_image().iter().for_each(|image| files_plan.reads("--skew", image));
     files_plan.writes("the output", &args.output);
     if args.resumable {
         files_plan.writes("its finished parts", parts_path(&args.output));
@@ -330,6 +380,7 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         let _folder = model.as_ref().is_some_and(|m| m.folder.is_some()).then(|| as_gltf(cage_model)).transpose()?;
         check_cage(&scene, cage_model)?;
     }
+    let skew_map = args.skew_image().map(|image| SkewMap::load(image, &planned)).transpose()?;
 
     // lights may be meshes, which have no textures
     lighting.apply(&mut scene)?;
@@ -343,16 +394,13 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     copied.iter().for_each(|remark| warnings.add(remark));
 
     // the maps, or the values of vertices
-    let cage = match &cage_model {
-        Some(cage_model) => Cage::Model(cage_model),
-        None => Cage::Distance(cage_distance(args, &scene)),
-    };
+    let detailed = detailed.as_ref().map(|detailed| detailed_of(args, &scene, detailed, &cage_model, &skew_map));
     let session = BakeSession {
         scene: &scene,
         device: &device,
         tracing: &args.device,
         settings: &settings,
-        detailed: detailed.as_ref().map(|scene| Detailed { scene, cage }),
+        detailed,
         occluding: &occluding,
     };
     let mut control = ProgressControl { progress: Progress::new("baking", &console), keep_partial: false };
@@ -412,7 +460,8 @@ fn bake_and_write(
         // the maps, of which some parts may be there
         (Target::Texture, model) => {
             let mut kept = args.resumable.then(|| parts_of(args, session, &planned)).transpose()?;
-            let maps = session.bake_textures_in_parts(&planned, kept.as_mut(), control)?;
+            let maps = session.bake_textures_in_parts(&planned, kept.as_mut(), control);
+            let maps = maps.map_err(|e| if let Some(kept) = &kept { kept.explain(e) } else { e })?;
             let rays = maps.iter().map(|m| m.rays).sum();
             record["textures"] = planned.iter().zip(&maps).map(|(t, m)| texture_record(t, m)).collect();
             let what = describe(&maps);
@@ -496,14 +545,32 @@ fn as_gltf(scene: &mut Scene) -> Result<(tempfile::TempDir, PathBuf)> {
     Ok((folder, path))
 }
 
-/// The distance from surfaces within which those of a detailed model are looked for, scene units.
-fn cage_distance(args: &BakeArgs, scene: &Scene) -> f64 {
+/// Whether a length is a number of scene units once the scene is known.
+fn is_finite(length: Length) -> bool {
+    length.units(1.0).is_some_and(f64::is_finite)
+}
+
+/// How the surfaces of a detailed model are looked for from those of the scene.
+fn detailed_of<'a>(
+    args: &BakeArgs,
+    scene: &Scene,
+    detailed: &'a Scene,
+    cage_model: &'a Option<Scene>,
+    skew_map: &'a Option<SkewMap>,
+) -> Detailed<'a> {
     let diagonal = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
-    let length = match &args.cage {
-        Some(CageArg::Distance(length)) => length.units(diagonal),
-        _ => None,
+    let cage = match (cage_model, &args.cage) {
+        (Some(cage_model), _) => Cage::Model(cage_model),
+        (None, Some(CageArg::Distance(length))) => Cage::Distance(length.units(diagonal).unwrap_or_default()),
+        (None, _) => Cage::Distance(DEFAULT_CAGE * diagonal),
     };
-    length.unwrap_or(0.02 * diagonal)
+    let behind = args.cage_behind.and_then(|length| length.units(diagonal));
+    let skew = match (skew_map, &args.skew) {
+        (Some(map), _) => Skew::Map(map),
+        (None, Some(SkewArg::Uniform(share))) => Skew::Uniform(*share),
+        (None, _) => Skew::default(),
+    };
+    Detailed { scene: detailed, cage, behind, skew }
 }
 
 /// The images that are written: one of the output's name, or with several textures one a material,

@@ -139,7 +139,16 @@ impl Texture {
     /// Linear colour and alpha at a point, interpolated by the texture's filter; its texels must
     /// not be empty. `uv`: any texture coordinates, v down. The texels are sRGB.
     pub fn look_up_srgb(&self, uv: Vec2) -> Vec4 {
-        let texel = |i: i64, j: i64| Vec4::from_array(self.texels.decode_srgb(self.texel_index(i, j)));
+        self.interpolate(uv, |index| self.texels.decode_srgb(index))
+    }
+
+    /// As [`Texture::look_up_srgb`], of texels that are linear as they are stored.
+    pub fn look_up(&self, uv: Vec2) -> Vec4 {
+        self.interpolate(uv, |index| self.texels.get(index))
+    }
+
+    fn interpolate(&self, uv: Vec2, value: impl Fn(usize) -> [f32; 4]) -> Vec4 {
+        let texel = |i: i64, j: i64| Vec4::from_array(value(self.texel_index(i, j)));
         // the casts saturate; NaN becomes 0
         let point = uv.as_dvec2() * DVec2::new(f64::from(self.width), f64::from(self.height));
         if self.filter == Filter::Nearest || !point.is_finite() {

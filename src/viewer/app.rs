@@ -62,9 +62,10 @@ const ANIMATION_FPS: f64 = 30.0;
 /// Width and height of a texture that is baked, texels, and samples: the defaults of `skylit bake`.
 const BAKE_SIZE: u32 = 1024;
 const BAKE_SPP: u32 = 64;
-/// Width and height of the picture of its preview, pixels, and samples of a pixel.
+/// Width and height of the picture of its preview, pixels, at most, and samples of a pixel: so many
+/// that what is partly transparent has little noise.
 const PREVIEW_SIZE: [u32; 2] = [420, 280];
-const PREVIEW_SPP: u32 = 16;
+const PREVIEW_SPP: u32 = 64;
 /// Offset of the truth's seed from that of the images.
 const TRUTH_SEED: u32 = 0x7275_7468;
 
@@ -1402,7 +1403,7 @@ impl App {
     /// Starts the preview of a bake, in place of the one before.
     pub fn preview_bake(&mut self, wanted: &BakeWanted) {
         let Some(scene) = &self.scene else { return };
-        let (source, size, spp) = (scene.source.clone(), Some(PREVIEW_SIZE), Some(PREVIEW_SPP));
+        let (source, size, spp) = (scene.source.clone(), Some(self.preview_size()), Some(PREVIEW_SPP));
         let settings = match self.render_settings(RenderedMotion::Nothing) {
             Ok(settings) => settings,
             Err(e) => return self.report(e.to_string(), true),
@@ -1430,6 +1431,13 @@ impl App {
             Ok(preview) => self.bake_preview = Some(preview),
             Err(e) => self.report(format!("no preview can be made: {e}"), true),
         }
+    }
+
+    /// Width and height of the picture of a preview, which shows as much as the view does.
+    fn preview_size(&self) -> [u32; 2] {
+        let [size, most] = [self.size(), PREVIEW_SIZE].map(|size| size.map(|n| f64::from(n.max(1))));
+        let scale = (most[0] / size[0]).min(most[1] / size[1]);
+        size.map(|n| (scale * n).round().max(1.0) as u32)
     }
 
     /// Opens a model that was baked, unless another scene was opened meanwhile.

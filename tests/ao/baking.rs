@@ -23,7 +23,7 @@ use skylit::tracer::{DeviceSettings, TracerChoice, TracerKind};
 use crate::common::{assert_validation_clean, device, picked};
 
 /// A rectangle with texture coordinates from (0, 0) at its first corner, which is `centre - u - v`.
-fn rectangle(centre: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
+pub(crate) fn rectangle(centre: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
     TriangleMesh {
         positions: vec![centre - u - v, centre + u - v, centre + u + v, centre - u + v],
         indices: vec![[0, 1, 2], [0, 2, 3]],
@@ -33,7 +33,7 @@ fn rectangle(centre: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
 }
 
 /// A scene of meshes, each with a material of its own, whose names are their numbers.
-fn scene_of(meshes: Vec<Geometry>) -> Scene {
+pub(crate) fn scene_of(meshes: Vec<Geometry>) -> Scene {
     let mut scene = Scene::default();
     for (k, geometry) in meshes.into_iter().enumerate() {
         scene.materials.push(Material { name: k.to_string(), ..Material::default() });
@@ -43,7 +43,7 @@ fn scene_of(meshes: Vec<Geometry>) -> Scene {
     scene
 }
 
-fn tracing(kind: TracerKind) -> DeviceSettings {
+pub(crate) fn tracing(kind: TracerKind) -> DeviceSettings {
     let tracer = match kind {
         TracerKind::Pipeline => TracerChoice::Pipeline,
         TracerKind::Query => TracerChoice::Query,
@@ -75,7 +75,7 @@ fn bake_all(
     planned.into_iter().zip(maps).collect()
 }
 
-fn settings(size: u32, spp: u32) -> BakeSettings {
+pub(crate) fn settings(size: u32, spp: u32) -> BakeSettings {
     BakeSettings { size: [size; 2], spp, ..BakeSettings::default() }
 }
 
@@ -549,7 +549,7 @@ fn gpu_bake_from_a_detailed_model() {
                 device: &device,
                 tracing: &tracing(kind),
                 settings: &settings,
-                detailed: Some(Detailed { scene: &detailed, cage: Cage::Distance(0.6) }),
+                detailed: Some(Detailed::new(&detailed, Cage::Distance(0.6))),
                 occluding: &[],
             };
             let map = session.bake_textures(&planned, &mut NoControl).unwrap().remove(0);
@@ -587,7 +587,7 @@ fn gpu_bake_from_a_cage() {
             device: &device,
             tracing: &tracing(kind),
             settings: &settings,
-            detailed: Some(Detailed { scene: &detailed, cage: Cage::Model(&cage) }),
+            detailed: Some(Detailed::new(&detailed, Cage::Model(&cage))),
             occluding: &[],
         };
         let planned = plan(&card, None, &settings, &mut NoControl).unwrap();

@@ -9,6 +9,7 @@ mod baking;
 mod catcher;
 mod closed_forms;
 mod film;
+mod high_to_low;
 mod images;
 mod rays;
 mod stopping;

@@ -563,6 +563,38 @@ fn gpu_what_was_interrupted_goes_on() {
     assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
 }
 
+/// Ctrl-C of a bake whose finished parts are kept says that the same command goes on, and it does.
+#[test]
+fn gpu_an_interrupted_bake_says_how_it_goes_on() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [model, exr, parts] = ["floor.obj", "a.exr", "a.exr.parts"].map(|name| place(&dir, name));
+    let corners = "v 0 0 1\nv 1 0 1\nv 1 0 0\nv 0 0 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    std::fs::write(&model, format!("{corners}f 1/1 2/2 3/3 4/4\n")).unwrap();
+    let args = ["bake", &model, "-o", &exr, "--size", "2048", "--spp", "16", "--ground", "--resumable"];
+    let child = skylit(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // the header has 48 bytes
+    until("no part", || std::fs::metadata(&parts).is_ok_and(|file| file.len() > 1 << 20));
+    signal(&child, "INT");
+    let out = child.wait_with_output().unwrap();
+    ends(&out, 130, "interrupted: the same command goes on with the");
+    let last = stderr(&out).lines().last().unwrap_or_default().to_owned();
+    assert!(last.contains(" finished part") && last.ends_with(&format!(" in {parts}")), "{last}");
+    assert!(!Path::new(&exr).exists());
+
+    // so it does
+    let out = run(&args);
+    let said = String::from_utf8_lossy(&out.stdout).into_owned() + &stderr(&out);
+    assert!(out.status.success() && said.contains("goes on with the finished parts in"), "{said}");
+    assert!(Path::new(&exr).is_file() && !Path::new(&parts).exists());
+
+    // before there is a part, there is nothing to go on with
+    let (out, _) = signalled(&["bake", &model, "-o", &exr, "--size", "64", "--resumable"], "INT", Duration::ZERO);
+    assert!(!stderr(&out).contains("finished part"), "{}", stderr(&out));
+}
+
 /// The second signal ends the program at once, whatever it does.
 #[test]
 fn gpu_a_second_signal_ends_at_once() {

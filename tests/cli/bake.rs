@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::Path;
 
+use glam::DVec3;
 use serde_json::Value;
 use skylit::output;
+use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::load::load;
-use skylit::scene::{Geometry, Scene};
+use skylit::scene::{Geometry, Instance, Scene};
 
 use crate::common::command::{device, fails, json, place, refuses, run, stderr};
 
@@ -316,6 +318,54 @@ fn other_models_occlude_and_are_cages() {
     );
 }
 
+/// A detailed model is looked for as far behind and as straight as wanted, also from vertices.
+#[test]
+fn rays_to_a_detailed_model_are_as_long_and_as_straight_as_wanted() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let model = squares(dir.path(), "floor.obj", 0.0, &[[0, 0]]);
+    let below = squares(dir.path(), "below.obj", -0.1, &[[0, 0]]);
+    let cage = squares(dir.path(), "cage.obj", 0.05, &[[0, 0]]);
+    let [exr, glb, skew] = ["map.exr", "colours.glb", "skew.png"].map(|name| place(&dir, name));
+    let covered = |options: &[&str]| {
+        let base = [&model, "-o", &exr, "--from", &below, "--map", "position", "--size", "16"];
+        bakes(&[&base[..], options].concat())["textures"][0]["covered"].as_f64().unwrap()
+    };
+    for cage in ["0.05", &cage] {
+        assert_eq!(covered(&["--cage", cage]), 0.0, "{cage}");
+        assert_eq!(covered(&["--cage", cage, "--cage-behind", "0.15"]), 1.0, "{cage}");
+        // of a diagonal of 1.41
+        assert_eq!(covered(&["--cage", cage, "--cage-behind", "10%"]), 1.0, "{cage}");
+        assert_eq!(covered(&["--cage", cage, "--cage-behind", "5%"]), 0.0, "{cage}");
+    }
+
+    // vertices take the occlusion of what lies behind them; what meets nothing is open
+    let lid = place(&dir, "lid.obj");
+    let text = fs::read_to_string(&below).unwrap();
+    let above = fs::read_to_string(&below).unwrap().replace(" -0.1 ", " -0.05 ").replace("f 1/1 2/2 3/3 4/4", "");
+    fs::write(&lid, format!("{text}{above}f 8/8 7/7 6/6 5/5\n")).unwrap();
+    let grey = |options: &[&str]| {
+        let base = [&model, "-o", &glb, "--to", "vertices", "--from", &lid, "--ao-radius", "5", "--cage", "0.01"];
+        assert_eq!(bakes(&[&base[..], options].concat())["vertices"], 4);
+        let colors = triangles(&load(&glb).unwrap()).colors.clone();
+        colors.iter().map(|c| c.x).sum::<f32>() / 4.0
+    };
+    assert_eq!(grey(&[]), 1.0);
+    // the lid is met first, which looks down onto the floor
+    assert!(grey(&["--cage-behind", "0.2", "--skew", "1"]) < 0.5);
+
+    // a map of the skew is an image in the coordinates of the texture
+    image::GrayImage::from_pixel(2, 2, image::Luma([128])).save(&skew).unwrap();
+    assert_eq!(covered(&["--cage", "0.2", "--skew", &skew]), 1.0);
+    assert_eq!(covered(&["--cage", "0.2", "--skew", "0.5"]), 1.0);
+    let unwrapped = ["bake", &model, "-o", &glb, "--from", &below, "--skew", &skew, "--texcoord", "unwrap"];
+    fails(&run(&unwrapped), 64, &["--skew ", "skew.png: material", "gets new texture coordinates"]);
+    let missing = ["bake", &model, "-o", &exr, "--from", &below, "--skew", "none.png"];
+    fails(&run(&missing), 3, &["none.png: no such file"]);
+}
+
 #[test]
 fn instances_have_an_image_each() {
     if !device() {
@@ -384,6 +434,139 @@ fn instances_have_a_texture_each_in_a_model() {
     fails(&run(&args), 64, &["node `fold`", "EXT_mesh_gpu_instancing", "bake images"]);
     let out = run(&["bake", &instanced, "-o", &unique, "--size", "32", "--spp", "4"]);
     assert!(out.status.success(), "{}", stderr(&out));
+}
+
+/// A `.gltf` of one mesh on three nodes: two are skinned, each by two joints of its own, the third is not; all of them morph. An animation turns the upper joints about different axes, and changes the weights of each node.
+fn deformed(folder: &Path) -> String {
+    let (mut data, mut accessors, mut views) = (Vec::<u8>::new(), Vec::new(), Vec::new());
+    let mut add = |bytes: Vec<u8>, kind: u32, shape: &str, count: usize| {
+        views.push(serde_json::json!({ "buffer": 0, "byteOffset": data.len(), "byteLength": bytes.len() }));
+        data.extend(bytes);
+        data.resize(data.len().next_multiple_of(4), 0);
+        let mut accessor = serde_json::json!({ "bufferView": views.len() - 1, "componentType": kind, "count": count });
+        accessor["type"] = shape.into();
+        if accessors.is_empty() {
+            (accessor["min"], accessor["max"]) = (serde_json::json!([0, 0, 0]), serde_json::json!([1, 2, 0]));
+        }
+        accessors.push(accessor);
+        accessors.len() - 1
+    };
+    let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let bind = |y: f32| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, y, 0.0, 1.0];
+    const FLOAT: u32 = 5126;
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+
+    // the strip: its lower corners follow the first joint, its upper ones the second, and a target moves one
+    let position = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 2.0, 0.0]);
+    assert_eq!(add(position, FLOAT, "VEC3", 4), 0);
+    add(floats(&[0.1, 0.1, 0.9, 0.1, 0.9, 0.9, 0.1, 0.9]), FLOAT, "VEC2", 4);
+    add([0, 1, 0, 0].repeat(4), 5121, "VEC4", 4);
+    let [lower, upper] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+    add(floats([lower, lower, upper, upper].as_flattened()), FLOAT, "VEC4", 4);
+    add(floats(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), FLOAT, "VEC3", 4);
+    add([0u16, 1, 2, 0, 2, 3].iter().flat_map(|v| v.to_le_bytes()).collect(), 5123, "SCALAR", 6);
+    add(floats([bind(0.0), bind(-1.0)].as_flattened()), FLOAT, "MAT4", 2);
+
+    // the animation
+    let times = add(floats(&[0.0, 1.0]), FLOAT, "SCALAR", 2);
+    let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+    let turns = [[0.0, 0.0, half, half], [half, 0.0, 0.0, half]].map(|turn| [[0.0, 0.0, 0.0, 1.0], turn]);
+    let turned = turns.iter().map(|t| (floats(t.as_flattened()), "VEC4", "rotation")).zip([4, 6]);
+    let weighted = [1.0, -1.0, 2.0].map(|w| (floats(&[0.25, w]), "SCALAR", "weights")).into_iter().zip([0, 1, 2]);
+    for ((values, shape, path), node) in turned.chain(weighted) {
+        let output = add(values, FLOAT, shape, 2);
+        channels.push(serde_json::json!({ "sampler": samplers.len(), "target": { "node": node, "path": path } }));
+        samplers.push(serde_json::json!({ "input": times, "output": output }));
+    }
+
+    // the file
+    fs::write(folder.join("strips.bin"), &data).unwrap();
+    let primitive = serde_json::json!({
+        "attributes": { "POSITION": 0, "TEXCOORD_0": 1, "JOINTS_0": 2, "WEIGHTS_0": 3 },
+        "targets": [{ "POSITION": 4 }], "indices": 5, "material": 0,
+    });
+    let document = serde_json::json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1, 2, 3, 5] }],
+        "nodes": [
+            { "mesh": 0, "skin": 0 }, { "mesh": 0, "skin": 1 }, { "mesh": 0, "translation": [10, 0, 0] },
+            { "children": [4] }, { "translation": [0, 1, 0] },
+            { "translation": [5, 0, 0], "children": [6] }, { "translation": [0, 1, 0] },
+        ],
+        "skins": [{ "joints": [3, 4], "inverseBindMatrices": 6 }, { "joints": [5, 6], "inverseBindMatrices": 6 }],
+        "meshes": [{ "primitives": [primitive], "weights": [0.25] }], "materials": [{ "name": "strip" }],
+        "animations": [{ "samplers": samplers, "channels": channels }],
+        "accessors": accessors, "bufferViews": views,
+        "buffers": [{ "uri": "strips.bin", "byteLength": data.len() }],
+    });
+    let path = folder.join("strips.gltf");
+    fs::write(&path, document.to_string()).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// Corners of all triangles of each instance in world space, at a time of the first animation.
+fn posed(scene: &Scene, seconds: f64) -> Vec<Vec<DVec3>> {
+    let (mut scene, mut pose) = (scene.clone(), Pose::default());
+    scene.rig.as_ref().unwrap().pose(0, seconds, Playback::Once, &mut pose).unwrap();
+    pose.apply(&mut scene);
+    let corners = |instance: &Instance| {
+        let Geometry::Triangles(t) = &scene.meshes[instance.mesh].geometry else { panic!("no triangles") };
+        let corner = |v: &u32| instance.object_to_world.transform_point3(t.positions[*v as usize].as_dvec3());
+        t.indices.as_flattened().iter().map(corner).collect()
+    };
+    scene.instances.iter().map(corners).collect()
+}
+
+/// Copies of skinned and morphed meshes keep skins, weights and targets: each of them deforms as before, in the animation, too.
+#[test]
+fn instances_that_deform_have_a_texture_each() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (model, glb) = (deformed(dir.path()), place(&dir, "unique.glb"));
+    let before = load(&model).unwrap();
+    assert!(before.report.warnings.is_empty(), "{:?}", before.report.warnings);
+
+    // no two instances are deformed alike, and none is as at rest
+    let apart = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+    let shape = |corners: &[DVec3]| corners.iter().map(|c| *c - corners[0]).collect::<Vec<_>>();
+    let [rest, moved] = [0.0, 1.0].map(|seconds| posed(&before, seconds));
+    assert!(moved.len() == 3 && rest.iter().zip(&moved).all(|(a, b)| apart(a, b) > 0.3), "{rest:?} {moved:?}");
+    for [a, b] in [[0, 1], [0, 2], [1, 2]] {
+        assert!(apart(&shape(&moved[a]), &shape(&moved[b])) > 0.3, "{moved:?}");
+    }
+
+    // with the texture coordinates of the file, and with new ones, for which vertices are written anew
+    for texcoord in ["0", "unwrap"] {
+        let options = ["--size", "32", "--spp", "4", "--unique-instances", "--texcoord", texcoord];
+        let record = bakes(&[&[&model, "-o", &glb], &options[..]].concat());
+        assert_eq!(record["textures"].as_array().unwrap().len(), 3, "{record}");
+        let after = load(&glb).unwrap();
+        assert!(after.report.warnings.is_empty(), "{:?}", after.report.warnings);
+        assert_eq!(after.instances.len(), 3);
+        for seconds in [0.0, 0.5, 1.0] {
+            let pairs = posed(&before, seconds).into_iter().zip(posed(&after, seconds));
+            let worst = pairs.map(|(a, b)| apart(&a, &b)).fold(0.0, f64::max);
+            assert!(worst < 1e-6, "--texcoord {texcoord}, {seconds} s: {worst}");
+        }
+
+        // a mesh, a material and a texture each, with the joints, weights and targets of one primitive
+        let document = document(&glb);
+        let nodes: Vec<&Value> = document["nodes"].as_array().unwrap().iter().take(3).collect();
+        assert_eq!(nodes.iter().map(|n| n["skin"].as_u64()).collect::<Vec<_>>(), [Some(0), Some(1), None]);
+        let meshes = nodes.iter().map(|n| &document["meshes"][n["mesh"].as_u64().unwrap() as usize]);
+        let meshes: Vec<&Value> = meshes.collect();
+        let materials = meshes.iter().map(|m| m["primitives"][0]["material"].as_u64().unwrap());
+        assert_eq!(materials.collect::<std::collections::BTreeSet<_>>().len(), 3);
+        for mesh in &meshes {
+            assert_eq!(mesh["weights"], meshes[0]["weights"]);
+            for part in ["attributes", "targets", "indices"] {
+                assert_eq!(mesh["primitives"][0][part], meshes[0]["primitives"][0][part]);
+            }
+            assert!(mesh["primitives"][0]["attributes"]["JOINTS_0"].is_u64(), "{mesh}");
+        }
+        assert_eq!(document["animations"][0]["channels"].as_array().unwrap().len(), 5);
+    }
 }
 
 /// One texture for all materials, as exact as those that have as many texels together.
@@ -474,6 +657,25 @@ fn what_cannot_be_baked_is_refused() {
     refuses(&["bake", &model, "-o", &png, "--occluders", "all"], 64, "scene, material or a model");
     refuses(&["bake", &model, "-o", &png, "--occluders", "scene", "--occluders", "material"], 64, "not both");
     refuses(&["bake", &model, "-o", &png, "--from", &model, "--cage", "wide"], 64, "or a model");
+    // what says where a detailed model is looked for
+    let from = |options: &[&str], says: &str| {
+        refuses(&[&["bake", &model, "-o", &png, "--from", &model], options].concat(), 64, says);
+    };
+    from(&["--occluders", "material"], "what --from names occludes");
+    from(&["--cage", "auto"], "--cage: a length or a share");
+    from(&["--cage", "inf"], "--cage: a length or a share");
+    from(&["--cage-behind", "auto"], "--cage-behind: a length or a share");
+    from(&["--cage-behind=-1"], "expected a length above 0");
+    from(&["--cage-behind", "NaN"], "expected a length above 0");
+    from(&["--cage-behind", &model], "expected a length above 0");
+    for wrong in ["--skew=-0.1", "--skew=1.5", "--skew=NaN", "--skew=auto", "--skew=grey.txt"] {
+        from(&[wrong], "expected a number from 0 to 1, or an image");
+    }
+    for alone in ["--cage=1", "--cage-behind=1", "--skew=1"] {
+        refuses(&["bake", &model, "-o", &png, alone], 64, "--from");
+    }
+    let vertices = ["bake", &model, "-o", &glb, "--to", "vertices", "--from", &model, "--skew", "grey.png"];
+    refuses(&vertices, 64, "--skew: an image is for textures");
     let tangent = ["bake", &model, "-o", &png, "--map", "normal", "--space", "tangent", "--seams", "match"];
     refuses(&tangent, 64, "turns at a seam");
     if !device() {

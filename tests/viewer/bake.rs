@@ -323,7 +323,7 @@ fn gpu_a_scene_is_baked_and_compared() {
 fn a_preview_is_shown_in_the_dialog() {
     let dir = tempfile::tempdir().unwrap();
     let (told, picture) = (dir.path().join("told"), dir.path().join("picture.png"));
-    image::RgbaImage::from_pixel(42, 28, image::Rgba([200, 100, 50, 255])).save(&picture).unwrap();
+    image::RgbaImage::from_pixel(420, 280, image::Rgba([200, 100, 50, 255])).save(&picture).unwrap();
     let script = |render: &str| {
         let told = told.display();
         format!("printf '%s ' \"$@\" >> {told}; printf '\\n' >> {told}; test $1 = bake || {render}")
@@ -346,6 +346,24 @@ fn a_preview_is_shown_in_the_dialog() {
     }
     for part in ["render ", "preview.glb --no-config -o", "preview.png", "--integrator baked-occlusion", "--camera 0"] {
         assert!(render.contains(part), "{render}: {part}");
+    }
+    // as wide for its height as the view
+    let size = render.split(" --size ").nth(1).unwrap().split(' ').next().unwrap();
+    let [width, height] = [0, 1].map(|k| size.split('x').nth(k).unwrap().parse::<f64>().unwrap());
+    let [w, h] = alone.harness.state().size().map(|n| f64::from(n.max(1)));
+    assert!(width <= 420.0 && height <= 280.0 && (width == 420.0 || height == 280.0), "{size}");
+    assert!((width / height - w / h).abs() < 0.02 * w / h, "{size}: {w}x{h}");
+
+    // the title, the picture and the buttons are within a small window
+    for [wide, high] in [[700.0, 480.0], [1200.0, 780.0]] {
+        alone.harness.set_size(egui::vec2(wide, high));
+        alone.harness.run_steps(4);
+        let close = alone.harness.get_by_role_and_label(Role::Button, "Close window").rect();
+        let bake = alone.harness.get_by_role_and_label(Role::Button, "Bake").rect();
+        let image = alone.harness.get_by_role_and_label(Role::Image, "Preview of the baked model").rect();
+        assert!(close.top() > 0.0 && bake.bottom() < high, "{wide}x{high}: {close:?} {bake:?}");
+        assert!(image.height() > 59.0 && image.bottom() < bake.top(), "{wide}x{high}: {image:?} {bake:?}");
+        assert!((image.width() / image.height() - 1.5).abs() < 0.02, "{image:?}");
     }
     let model = bake.split(' ').nth(3).unwrap().to_owned();
     assert!(render.contains(&model));

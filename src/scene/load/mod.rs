@@ -42,6 +42,7 @@ pub use options::{
     GeometryOptions, LoadOptions, LoadPart, LoadProgress, NormalSource, Projection, UpAxis, is_in_progress,
 };
 
+pub use picture::load_texture;
 pub use tangents::tangents_of_corners;
 
 use crate::error::{Error, Result};

@@ -1,16 +1,20 @@
 //! Decoding of image files.
 
+use std::path::Path;
+
 use image::{ColorType, ImageFormat};
 
-use crate::files::placeholder;
+use crate::error::{Error, Result};
+use crate::files::{self, placeholder};
 use crate::memory::Budget;
 use crate::output::decode::{self, MaxSize};
 use crate::output::radiance::{self, RadianceImage};
-use crate::scene::TexelData;
 #[cfg(feature = "dds")]
 use crate::scene::load::dds;
 #[cfg(feature = "ktx2")]
 use crate::scene::load::ktx2;
+use crate::scene::texture::{Filter, Wrap};
+use crate::scene::{TexelData, Texture};
 
 /// Largest width and height.
 pub(super) const MAX_SIDE: u32 = 16384;
@@ -21,6 +25,20 @@ pub(super) struct DecodedImage {
     pub width: u32,
     pub height: u32,
     pub texels: TexelData,
+}
+
+/// Reads an image of a format that textures of scenes have, with values as they are stored.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::OutOfMemory`].
+pub fn load_texture(path: &Path) -> Result<Texture> {
+    let (bytes, budget) = (files::read(path)?, Budget::default());
+    budget.read(bytes.len());
+    let decoded = decode(&bytes, &path.to_string_lossy(), &budget);
+    budget.check().map_err(|e| e.in_file(path))?;
+    let DecodedImage { width, height, texels } = decoded.map_err(|e| Error::input(path, e))?;
+    let name = path.to_string_lossy().into_owned();
+    Ok(Texture { name, width, height, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Linear })
 }
 
 /// Bytes of a texel of this kind, and of what it is made of: the decoder's pixel, and four channels

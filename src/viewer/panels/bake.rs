@@ -13,6 +13,10 @@ use crate::viewer::rounding::round_length;
 const SIZES: [u32; 6] = [256, 512, 1024, 2048, 4096, 8192];
 /// Greatest side of a texture, texels.
 const MAX_SIDE: u32 = 16_384;
+/// Height of the dialog's title, of its buttons and of margins, points.
+const BESIDES: f32 = 120.0;
+/// Least height of the preview's picture, points.
+const LEAST_HEIGHT: f32 = 60.0;
 
 /// The dialog as it opens.
 pub fn dialog(app: &App) -> Dialog {
@@ -124,7 +128,10 @@ pub fn preview(app: &App, ui: &mut Ui, wanted: &BakeWanted) -> bool {
         };
     });
     if let Some(Shown::Picture(picture)) = app.bake_preview.as_ref().map(BakePreview::shown) {
-        ui.add(egui::Image::new(picture).alt_text("Preview of the baked model"));
+        // the buttons below stay within the window, and so does the title
+        let room = ui.ctx().content_rect().height() - ui.min_rect().height() - BESIDES;
+        let image = egui::Image::new(picture).max_height(room.max(LEAST_HEIGHT)).shrink_to_fit();
+        ui.add(image.alt_text("Preview of the baked model"));
     }
     is_asked
 }
