@@ -40,6 +40,10 @@ reference:
 windows:
     ./scripts/windows.sh check
 
+# what is compiled for Windows and macOS alone, by the compiler's check
+systems:
+    ./scripts/other_systems.sh
+
 # a kit for a machine with a GPU
 gpu:
     ./scripts/gpu.sh

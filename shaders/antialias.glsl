@@ -35,6 +35,7 @@ struct Images {
     ivec2 size;
     uvec2 guide;
     uvec2 previous_guide;
+    uvec2 normals;
     // null for visibility, which has no colour
     uvec2 composed;
     uvec2 visibility;
@@ -46,8 +47,11 @@ uint image_index(Images m, ivec2 pixel) { return uint(pixel.y * m.size.x + pixel
 // This frame's value and coverage. `guide`: of the pixel.
 vec4 value_at(Images m, uvec2 guide, uint at) {
     if (!is_null(m.composed)) return load_quad(m.composed, at);
+    float visibility = FloatImage(m.visibility).v[at];
+    // a ground that catches shadows is black where it is occluded, and else not there
+    if (HAS_CATCHER && is_surface(guide) && is_catcher(m.normals, at)) return vec4(vec3(0.0), 1.0 - visibility);
     // coverage is that of the sample
-    return vec4(vec3(FloatImage(m.visibility).v[at]), is_surface(guide) ? 1.0 : 0.0);
+    return vec4(vec3(visibility), is_surface(guide) ? 1.0 : 0.0);
 }
 
 // The resolved image and its coverage, which has 16 bits, as has the number of frames.
@@ -279,7 +283,7 @@ void main() {
     AntialiasParams p = AntialiasParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     ivec2 pixel = ivec2(image_pixel(f, at));
-    Images m = Images(ivec2(f.size), f.guide, f.previous_guide, p.composed, p.visibility, p.previous_history);
+    Images m = Images(ivec2(f.size), f.guide, f.previous_guide, f.normals, p.composed, p.visibility, p.previous_history);
     vec4 now = value_at(m, LOAD_PAIR(m.guide, at), at), resolved = now;
     float frames = 1.0;
     if (p.holds != 0u) {
@@ -333,7 +337,7 @@ void main() {
                 uint tap = image_index(m, ivec2(x, y));
                 Rest r = load_rest(rests, tap);
                 if (r.frames < 2.0) continue;
-                vec3 d = value_at(m, LOAD_PAIR(m.guide, tap), tap).rgb - r.mean;
+                vec3 d = vec3(FloatImage(m.visibility).v[tap]) - r.mean;
                 differences += dot(d, d);
                 error += rest_error(r);
             }
@@ -342,7 +346,10 @@ void main() {
         float share = differences > error ? (differences - error) / differences : 0.0;
         share *= clamp((own.frames - FEW_FRAMES) / FEW_FRAMES, 0.0, 1.0);
         share = max(share, own.samples / (own.samples + TAKE_OVER_SAMPLES));
-        resolved = mix(resolved, vec4(vec3(FloatImage(p.denoised).v[at]), own.coverage), share);
+        vec4 converged = vec4(vec3(FloatImage(p.denoised).v[at]), own.coverage);
+        // what passes a catcher is no value of the image, and covers nothing; where there is nothing else it is denoised, too
+        if (HAS_CATCHER) converged = max(converged - (own.is_caught ? converged.r : own.passed), 0.0);
+        resolved = mix(resolved, converged, share);
     }
     store_quad(p.resolved, at, resolved);
 }

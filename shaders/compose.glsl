@@ -17,9 +17,13 @@ void main() {
         RestParts parts = load_parts(p.rest_parts, at);
         c = vec4(rest.mean, rest.coverage);
         if (is_filtered) c.rgb = direct_part(rest, parts) + parts.albedo * load_radiance(p.diffuse, at).mean + rest.coverage * load_radiance(p.specular, at).mean;
+        if (HAS_CATCHER) c.a -= is_filtered && rest.is_caught ? rest.coverage * load_radiance(p.diffuse, at).mean.r : rest.passed;
     } else if (is_filtered) {
         vec3 albedo = load_quad(p.materials, at).rgb;
-        c.rgb += albedo * load_radiance(p.diffuse, at).mean + load_radiance(p.specular, at).mean;
+        vec3 diffuse = load_radiance(p.diffuse, at).mean;
+        c.rgb += albedo * diffuse + load_radiance(p.specular, at).mean;
+        // a catcher covers by the light that it does not get
+        if (HAS_CATCHER && c.a == COVERS_CAUGHT) c.a = 1.0 - diffuse.r;
     }
     store_quad(p.composed, at, c);
 }

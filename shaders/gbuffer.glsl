@@ -27,6 +27,7 @@ void closest(uint index, Hit hit) {
     Hemisphere h = hemisphere_at(p, s, about_ns);
     STORE_PAIR(f.guide, at, make_guide(depth, h.ng, hit.instance));
     store_surface(f, at, s.position, s.offset, h.ng);
+    if (g.catcher != INVALID && load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh).material == g.catcher) store_caught(f, at, h.ng);
     if (about_ns) {
         FloatImage axes = FloatImage(f.axes);
         for (uint k = 0u; k < 3u; k++) axes.v[3u * at + k] = h.axis[k];

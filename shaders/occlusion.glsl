@@ -16,7 +16,7 @@ void add_sample(uint index, bool occluded, float occlusion) {
     float visibility = 1.0 - occlusion;
     if (HAS_CATCHER && (at & CAUGHT) != 0u) {
         at &= ~CAUGHT;
-        visibility = occluded ? 0.0 : -1.0;
+        visibility = occluded ? 0.0 : CAUGHT_UNOCCLUDED;
     }
     Samples(p.samples).v[at] = visibility;
 }

@@ -48,6 +48,9 @@ void main() {
     uint at = image_index(f, pixel);
     RadianceEstimate diffuse = NO_RADIANCE, specular = NO_RADIANCE, whole = NO_RADIANCE;
     RestParts parts = NO_PARTS;
+    // of catchers
+    float passed = 0.0;
+    bool is_caught = WITH_CATCHER;
     float covered = 0.0, distance_ = 0.0, distances = 0.0;
     for (uint s = 0u; s < n; s++) {
         uint i = p.first_path + k * n + s;
@@ -66,6 +69,11 @@ void main() {
         parts.albedo += albedo.rgb;
         parts.specular += rest;
         covered += direct.a;
+        if (WITH_CATCHER) {
+            // the share of light reaches all channels alike
+            if (albedo.w == SIGNAL_CAUGHT) passed += d.r;
+            else is_caught = false;
+        }
         if (d.a >= 0.0) {
             distance_ += min(d.a, 1e30);
             distances += 1.0;
@@ -86,7 +94,7 @@ void main() {
     RestParts past = begins ? NO_PARTS : load_parts(p.rest_parts, at);
     float samples = max(whole.samples, 1.0);
     parts = RestParts(parts.diffuse / samples, 0.0, parts.albedo / samples, 0.0, parts.specular / samples);
-    Rest after = add_rest(before, whole.mean, whole.samples, covered / samples);
+    Rest after = add_rest(before, whole.mean, whole.samples, covered / samples, passed / samples, is_caught);
     store_rest(p.rest, at, after);
     store_parts(p.rest_parts, at, add_parts(past, before, after, parts, covered / samples));
 }

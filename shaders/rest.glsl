@@ -15,9 +15,10 @@ void main() {
     if (is_sampled(f, pixel)) {
         if (is_surface(LOAD_PAIR(f.guide, at))) {
             Estimate e = unpack_estimate(LOAD_PAIR(p.current, at));
-            rest = add_rest(rest, vec3(e.mean), e.samples, 1.0);
+            bool caught = is_catcher(f.normals, at);
+            rest = add_rest(rest, vec3(e.mean), e.samples, 1.0, caught ? e.mean : 0.0, caught);
         } else {
-            rest = add_rest(rest, vec3(0.0), float(f.rays_per_pixel), 0.0);
+            rest = add_rest(rest, vec3(0.0), float(f.rays_per_pixel), 0.0, 0.0, false);
         }
     }
     store_rest(p.rest, at, rest);

@@ -16,7 +16,7 @@ void main() {
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
             vec4 b = load_quad(rests, 2u * (uint(y) * f.size.x + uint(x)) + 1u);
-            error += rest_error(Rest(vec3(0.0), 0.0, b.x, b.y, 0.0)) * pow(max(b.y, 1.0), -p.evenness);
+            error += rest_error(Rest(vec3(0.0), 0.0, b.x, b.y, 0.0, 0.0, false)) * pow(max(b.y, 1.0), -p.evenness);
         }
     }
     error /= float((upper.x - lower.x + 1) * (upper.y - lower.y + 1));

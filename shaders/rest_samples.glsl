@@ -2,6 +2,7 @@
 // They lie anywhere within their pixel, as those of a still. Their mean becomes the history of the pixel's surface, and counts little where the pixel shows others, too.
 #include "common/frame.glsl"
 #include "common/rest.glsl"
+#include "interface/ao.glsl"
 #include "interface/radiance.glsl"
 
 layout(local_size_x = LANES) in;
@@ -41,16 +42,25 @@ void main() {
     uint first = k << push.sample_bits, count = 1u << push.sample_bits, group = min(count, 1u << GROUP_BITS), hits = 0u;
     for (uint s = 0u; s < count; s += group) {
         float sum = 0.0;
-        uint covered = 0u;
+        uint covered = 0u, passed = 0u;
+        bool is_caught = HAS_CATCHER;
         for (uint i = 0u; i < group; i++) {
             float visibility = samples.v[first + s + i];
+            if (HAS_CATCHER) {
+                if (visibility == CAUGHT_UNOCCLUDED) {
+                    visibility = 1.0;
+                    passed++;
+                } else if (visibility != 0.0) {
+                    is_caught = false;
+                }
+            }
             // a camera ray that missed counts as 0
             if (visibility < 0.0) continue;
             sum += visibility;
             covered++;
         }
         hits += covered;
-        rest = add_rest(rest, vec3(sum / float(group)), float(group), float(covered) / float(group));
+        rest = add_rest(rest, vec3(sum / float(group)), float(group), float(covered) / float(group), float(passed) / float(group), is_caught);
     }
     store_rest(p.rest, at, rest);
     if (hits > 0u) atomicAdd(QueueCount(p.ray_count).v[0], hits);

@@ -65,6 +65,12 @@ void store_surface(FrameParams f, uint at, vec3 position, float spawn_offset, ve
     STORE_PAIR(f.normals, 2u * at + 1u, floatBitsToUint(vec2(normal.z, 0.0)));
 }
 
+// A pixel that shows a ground that catches shadows: its surface has been stored, and this is a word of it that surfaces leave 0.
+void store_caught(FrameParams f, uint at, vec3 normal) { STORE_PAIR(f.normals, 2u * at + 1u, uvec2(floatBitsToUint(normal.z), 1u)); }
+
+// `at`: a pixel that shows a surface.
+bool is_catcher(uvec2 normals, uint at) { return HAS_CATCHER && LOAD_PAIR(normals, 2u * at + 1u).y != 0u; }
+
 // Where in the image a pixel's sample lies in this frame.
 vec2 sample_place(FrameParams f, vec2 pixel) {
     return pixel + 0.5 + f.offset;

@@ -10,6 +10,9 @@ const uint CATCHER_CANDIDATES = 16u;
 // Steps of the second number of a candidate: the golden ratio, which spreads any number of them.
 const float CATCHER_STEP = 0.61803399;
 
+// In frames a catcher has at least this albedo, linear, in each channel: the share of light is kept before black, too, and nobody sees it.
+const float MIN_BEHIND = 1e-5;
+
 // The candidate that has been chosen so far.
 struct Caught {
     Ray ray;      // no_ray() if there is none
@@ -66,7 +69,10 @@ void catch_shadow(BlockParams block, PathParams p, uint k, PathState state, Surf
             }
         }
     }
-    leave_caught_ray(p, k, caught.ray, counted_radiance(p, state.throughput * behind_catcher(p, state, w), 0u));
+    vec3 behind = counted_radiance(p, state.throughput * behind_catcher(p, state, w), 0u);
+    // frames filter the share of light as the light of a diffuse surface, whose albedo is what is behind
+    if (WITH_SIGNAL) store_signal(p, k, SIGNAL_ALBEDO, vec4(max(behind, vec3(MIN_BEHIND)), SIGNAL_CAUGHT));
+    leave_caught_ray(p, k, caught.ray, behind);
 }
 
 #endif

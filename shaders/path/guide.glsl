@@ -93,10 +93,13 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
     Shading m;
-    if (WITH_CONSTANT_ALBEDO) m = grey_shading(s, towards_viewer, p.albedo);
+    bool is_caught = WITH_CATCHER && g.bounces == 0u && load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh).material == p.catcher;
+    if (WITH_CONSTANT_ALBEDO || is_caught) m = grey_shading(s, towards_viewer, p.albedo);
     else m = shade(s, towards_viewer, SHARP);
+    // what is behind a catcher takes the place of its albedo
+    if (is_caught) m.bsdf.diffuse = background(p, ray.direction);
     g.far += hit.t * length(ray.direction);
-    if (g.bounces == 0u) store_quad(q.direct, at, vec4(counted_radiance(p, m.emission, 0u), 1.0));
+    if (g.bounces == 0u) store_quad(q.direct, at, vec4(counted_radiance(p, m.emission, 0u), is_caught ? COVERS_CAUGHT : 1.0));
     bool scatters = m.bsdf.kind == BSDF_NONE || has_rough_part(m.bsdf);
 
     // the point where it seems to be, now and in the previous frame

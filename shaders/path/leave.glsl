@@ -92,6 +92,7 @@ void leave_light_ray(PathParams p, uint k, bool is_second, Ray r, vec3 contribut
 void leave_caught_ray(PathParams p, uint k, Ray r, vec3 contribution) {
     uint slot = append_ray(p.shadow, r, k);
     store_quad(p.contributions, slot, vec4(contribution, -1.0));
+    if (WITH_SIGNAL) store_quad(p.diffuse_contributions, slot, vec4(vec3(1.0), 0.0));
 }
 
 Cone load_cone(PathParams p, uint k) {

@@ -385,16 +385,17 @@ fn entries(
                 if let Some(what) = without_effect {
                     warnings.add(&format!("{} ({words}): {what}", letter(k)));
                 }
+                let background = settings.backdrop().colour();
                 rendered.push((k, settings));
                 let description =
                     [Some(renderer.name().to_owned()), frame].into_iter().flatten().collect::<Vec<_>>().join(", ");
-                Entry { name: words.clone(), description, choices, image }
+                Entry { name: words.clone(), description, choices, image, background }
             }
             _ => {
                 let Some((image, (path, name))) = loaded.next() else { continue };
                 let description = path.display().to_string();
                 let description = if description == name { String::new() } else { description };
-                Entry { description, name, choices: Vec::new(), image }
+                Entry { description, name, image, ..Entry::default() }
             }
         });
     }

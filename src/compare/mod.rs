@@ -29,6 +29,8 @@ pub struct Entry {
     /// A sentence for each setting that was left open and the scene decided.
     pub choices: Vec<String>,
     pub image: Image,
+    /// The linear colour that pages show it on, where its settings have one.
+    pub background: Option<[f32; 3]>,
 }
 
 /// Images, and how each of them differs from the one that is the reference.

@@ -16,6 +16,7 @@ pub fn page(set: &ImageSet, command: &str) -> Result<Page> {
             name,
             description: &entry.description,
             image: &entry.image,
+            background: entry.background,
             comparison: comparison.as_ref(),
         })
         .collect();

@@ -107,6 +107,10 @@ impl Device {
             extensions.push(khr::ray_query::NAME.as_ptr());
             create = create.push_next(&mut f_query);
         }
+        if info.is_portability_subset {
+            // Vulkan wants it enabled where it is, with none of the features that are optional in it
+            extensions.push(khr::portability_subset::NAME.as_ptr());
+        }
         create = create.enabled_extension_names(&extensions);
 
         // SAFETY: the physical device is of this instance; everything enabled was reported as

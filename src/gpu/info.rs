@@ -81,6 +81,9 @@ pub struct DeviceInfo {
     /// Supported ray-tracing extensions.
     #[serde(skip)]
     pub ray_tracing: RayTracingExtensions,
+    /// VK_KHR_portability_subset: the driver translates to another API, as MoltenVK does to Metal.
+    #[serde(skip)]
+    pub(super) is_portability_subset: bool,
     /// Requirements of rasterization that the device lacks; it can rasterize when empty.
     pub missing_raster: Vec<String>,
     /// Device limits.
@@ -283,6 +286,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         unified_memory: matches!(kind, "cpu" | "integrated"),
         buffer_device_address: vulkan13 && f12.buffer_device_address == vk::TRUE,
         ray_tracing,
+        is_portability_subset: has(khr::portability_subset::NAME),
         missing_raster,
         limits,
         queue_family,

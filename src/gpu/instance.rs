@@ -3,7 +3,7 @@
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 
 use super::result::Context;
 use crate::error::{Error, Result};
@@ -141,7 +141,15 @@ impl Instance {
         }
         let log = validation.then(|| Arc::new(ValidationLog::default()));
         let mut create_messenger = log.as_ref().map(messenger_info);
+        // drivers over another API, as MoltenVK is, are listed for those that know of them only
+        let lists_portable =
+            extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::portability_enumeration::NAME));
+        if lists_portable {
+            extension_names.push(khr::portability_enumeration::NAME.as_ptr());
+        }
+        let listed = vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
         let mut info = vk::InstanceCreateInfo::default()
+            .flags(if lists_portable { listed } else { vk::InstanceCreateFlags::empty() })
             .application_info(&application)
             .enabled_layer_names(&layer_names)
             .enabled_extension_names(&extension_names);

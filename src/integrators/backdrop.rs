@@ -34,6 +34,11 @@ impl Backdrop {
         }
     }
 
+    /// The colour of pictures, linear.
+    pub fn colour(self) -> Option<[f32; 3]> {
+        if let Self::Colour(colour) = self { Some(colour) } else { None }
+    }
+
     /// Whether camera rays do not show the environment.
     pub fn hides_environment(self) -> bool {
         self.of_pictures().is_some()

@@ -69,6 +69,6 @@ constants! {
     BENT_NORMALS: bool = false;
     #[doc = "Steps of the filter have strides: pixels between taps are left out."]
     FILTER_STRIDES: bool = false;
-    #[doc = "Samples of ambient occlusion see a ground that catches shadows."]
+    #[doc = "Images show a ground that catches shadows; those of paths have a feature besides."]
     HAS_CATCHER: bool = false;
 }

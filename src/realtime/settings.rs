@@ -170,6 +170,10 @@ pub struct Settings {
     pub rest_rr_depth: u32,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
+    /// Ambient visibility: the material of a ground that catches occlusion, and is else not seen
+    /// ([`crate::scene::Scene::catcher`]). Of radiance it is that of the paths' options.
+    #[serde(skip)]
+    pub catcher: Option<u32>,
     /// Maximum rays of a launch, if fewer than the device's
     /// ([`crate::tracer::stream::launch_rays`]). Frames of small launches can be interrupted soon
     /// ([`super::Realtime::frame_with`]); images do not depend on it.
@@ -242,6 +246,9 @@ impl Settings {
                 "--preset larsen has one sample place in a pixel: leave antialiasing out, or choose another preset",
             );
         }
+        if self.catcher.is_some() && self.technique == Technique::Larsen {
+            return wrong("--preset larsen has no ground that catches occlusion: choose another preset, or a plane");
+        }
         if self.bent && self.technique != Technique::Traced {
             return wrong("bent normals need traced directions: choose --technique traced");
         }
@@ -250,6 +257,11 @@ impl Settings {
 }
 
 impl Settings {
+    /// Constants of shaders that treat a ground that catches occlusion by itself.
+    pub fn catcher_constants(&self) -> Specialization {
+        Specialization::default().set(constants::HAS_CATCHER, self.catcher.is_some())
+    }
+
     /// The settings with launches no larger than a device takes.
     pub(super) fn with_launches_of(&self, info: &DeviceInfo) -> Self {
         Self { launch_rays: self.launch_rays.min(launch_rays(info)), ..*self }
@@ -329,6 +341,7 @@ impl Preset {
             rest_samples: 256,
             rest_rr_depth: PathOptions::default().rr_depth,
             bent: false,
+            catcher: None,
             launch_rays: u32::MAX,
         };
 

@@ -26,7 +26,7 @@ use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::camera_path::CameraPath;
 use crate::scene::load::load_camera_path;
-use crate::scene::{Camera, LightKind, Orbit, Scene};
+use crate::scene::{Camera, Ground, LightKind, Orbit, Scene};
 use crate::settings::Capability;
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -142,7 +142,7 @@ impl Renderer {
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
             setup: Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), &settings.scene, warnings),
             preset: timeline.preset.unwrap_or_default(),
-            settings: realtime_settings,
+            settings: Settings { catcher: realtime.settings().catcher, ..realtime_settings },
             primary: realtime.settings().primary.unwrap_or_default(),
             primary_reason: realtime.primary_reason().to_owned(),
             frames: Vec::new(),
@@ -426,7 +426,8 @@ fn frame_metadata(
         }
         None => {
             let others = [("sequence", settings.sequence.to_string()), ("technique", settings.technique.to_string())];
-            settings.occlusion.metadata().into_iter().chain(others).collect()
+            let ground = settings.catcher.map(|_| ("ground", Ground::Catcher.to_string()));
+            settings.occlusion.metadata().into_iter().chain(others).chain(ground).collect()
         }
     };
     let filter = if settings.antialias { PixelFilter::Box } else { PixelFilter::Centre };
@@ -467,8 +468,7 @@ pub fn frame_path_options(
     (job.samples.size, job.samples.spp) = (size, realtime_settings.rays_per_pixel);
     let options = settings.integrator().get().path_options(&job)?;
     let rr_depth = settings.integrators.path.rr_depth.unwrap_or(settings.frames.preset.unwrap_or_default().rr_depth());
-    // frames show a ground that catches shadows as a plane
-    Ok(options.map(|options| PathOptions { rr_depth, catcher: None, ..options }))
+    Ok(options.map(|options| PathOptions { rr_depth, ..options }))
 }
 
 /// The pipeline of frames. `paths`: options of the paths of frames of radiance.
@@ -484,7 +484,11 @@ pub fn pipeline(
 ) -> Result<Realtime> {
     match paths {
         Some(paths) => Realtime::radiance(tracer, flat, size, realtime_settings, paths),
-        None => Realtime::new(tracer, size, realtime_settings, &point_lights(flat.scene, flat)),
+        None => {
+            let catcher = flat.scene.catcher().filter(|_| realtime_settings.technique != Technique::Larsen);
+            let settings = Settings { catcher, ..*realtime_settings };
+            Realtime::new(tracer, size, &settings, &point_lights(flat.scene, flat))
+        }
     }
 }
 

@@ -616,9 +616,9 @@ impl RenderSettings {
             Ground::None if self.image.ground_height.is_some() => {
                 wrong("--ground-height: there is no ground; add --ground plane, or leave it out".into())
             }
-            Ground::Catcher if is_frames => wrong(
-                "--ground catcher is for stills: use --ground plane, or add --spp N for stills, one per frame".into(),
-            ),
+            Ground::Catcher if is_frames && self.frames.preset == Some(Preset::Larsen) => {
+                wrong("--ground catcher: --preset larsen has none; use --ground plane, or choose another preset".into())
+            }
             Ground::Catcher
                 if !integrator.can(Capability::LightTransport) && !integrator.can(Capability::AmbientVisibility) =>
             {

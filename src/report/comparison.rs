@@ -23,6 +23,8 @@ pub struct NamedImage<'a> {
     /// More about it, a line; may be empty.
     pub description: &'a str,
     pub image: &'a Image,
+    /// The linear colour that it is shown on, by its alpha; measurements are of the image alone.
+    pub background: Option<[f32; 3]>,
     /// How it differs from the reference; `None` for the reference itself.
     pub comparison: Option<&'a Comparison>,
 }
@@ -144,7 +146,7 @@ pub fn image_comparison(images: &[NamedImage], reference: usize) -> Result<Image
     let mask: Vec<bool> = (0..first.pixel_count()).map(counts).collect();
     let shown = images.iter().map(|i| {
         let flip = i.comparison.map(|c| c.maps.flip.clone()).filter(|f| !f.is_empty());
-        let values = interleaved(i.image, channels);
+        let values = interleaved(i.image, channels, i.background);
         ComparedImage { name: i.name.to_owned(), description: i.description.to_owned(), values, flip }
     });
     Ok(ImageComparison {
@@ -157,11 +159,27 @@ pub fn image_comparison(images: &[NamedImage], reference: usize) -> Result<Image
 }
 
 /// Values of the named channels, those of a pixel side by side. A grey image has the same value in
-/// all of them; a channel that it lacks otherwise is NaN.
-fn interleaved(image: &Image, channels: &[String]) -> Vec<f32> {
+/// all of them; a channel that it lacks otherwise is NaN. What alpha leaves open shows the
+/// background.
+fn interleaved(image: &Image, channels: &[String], background: Option<[f32; 3]>) -> Vec<f32> {
     let grey = ["Y", "R"].iter().find_map(|name| image.f32(name));
-    let planes: Vec<_> = channels.iter().map(|name| image.f32(name).or(grey)).collect();
-    (0..image.pixel_count()).flat_map(|k| planes.iter().map(move |p| p.map_or(f32::NAN, |p| p[k]))).collect()
+    let behind = |name: &str| match (background, name) {
+        (None, _) => 0.0,
+        (Some([r, _, _]), "R") => r,
+        (Some([_, g, _]), "G") => g,
+        (Some([_, _, b]), "B") => b,
+        (Some([r, g, b]), _) => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+    };
+    let planes: Vec<_> = channels.iter().map(|name| (image.f32(name).or(grey), behind(name))).collect();
+    let alpha = image.f32("A");
+    let open = |k: usize| alpha.map_or(0.0, |alpha| 1.0 - alpha[k].clamp(0.0, 1.0));
+    let value = |k: usize, (plane, behind): &(Option<&[f32]>, f32)| match plane {
+        None => f32::NAN,
+        // to the bit
+        Some(plane) if *behind == 0.0 => plane[k],
+        Some(plane) => plane[k] + open(k) * behind,
+    };
+    (0..image.pixel_count()).flat_map(|k| planes.iter().map(move |plane| value(k, plane))).collect()
 }
 
 /// Metrics, a row each, and images, a column each.
@@ -323,7 +341,7 @@ mod tests {
     fn a_section_has_the_numbers_of_the_comparison() {
         let (a, b) = (image(|k| if k == 9 { 0.7 } else { 0.5 }), image(|_| 0.5));
         let c = compare(&a, &b, &CompareOptions::default()).unwrap();
-        let named = |name, image, comparison| NamedImage { name, description: "", image, comparison };
+        let named = |name, image, comparison| NamedImage { name, description: "", image, background: None, comparison };
         let images = [named("a", &a, Some(&c)), named("b", &b, None)];
         let section = section("Images", &images, 1).unwrap();
         let [Part::Images(shown), Part::Table(metrics), Part::Chart(chart), Part::Table(regions)] = &section.parts[..]
@@ -344,6 +362,27 @@ mod tests {
     #[test]
     fn nothing_compared_is_an_error() {
         let a = image(|_| 0.5);
-        assert!(section("", &[NamedImage { name: "a", description: "", image: &a, comparison: None }], 0).is_err());
+        let named = NamedImage { name: "a", description: "", image: &a, background: None, comparison: None };
+        assert!(section("", &[named], 0).is_err());
+    }
+
+    /// What alpha leaves open shows the colour, also of grey images; without a colour values are the image's, to the bit.
+    #[test]
+    fn images_are_shown_on_their_background() {
+        let channel = |name: &str, values: &[f32]| Channel::from_floats(name, values.to_vec());
+        let plane = |value: f32| [value, 0.5 * value, 0.0, f32::NAN];
+        let colour = [("R", 0.2), ("G", 0.4), ("B", 0.8)].map(|(name, value)| channel(name, &plane(value)));
+        let alpha = channel("A", &[1.0, 0.5, 0.0, f32::NAN]);
+        let image =
+            Image { width: 4, height: 1, channels: colour.into_iter().chain([alpha]).collect(), ..Image::default() };
+        let names = ["R", "G", "B"].map(String::from);
+        let shown = interleaved(&image, &names, Some([1.0, 0.0, 0.5]));
+        let expected = [0.2, 0.4, 0.8, 0.6, 0.2, 0.65, 1.0, 0.0, 0.5];
+        assert!(shown.iter().zip(expected).all(|(a, b): (&f32, f32)| (a - b).abs() < 1e-6), "{shown:?}");
+        let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let own: Vec<f32> = (0..4).flat_map(|k| [0.2, 0.4, 0.8].map(|value| plane(value)[k])).collect();
+        assert_eq!(bits(&interleaved(&image, &names, None)), bits(&own));
+        let grey = Image { channels: vec![channel("Y", &[0.5, 0.0]), channel("A", &[1.0, 0.0])], width: 2, ..image };
+        assert_eq!(interleaved(&grey, &["Y".into()], Some([1.0; 3])), [0.5, 1.0]);
     }
 }

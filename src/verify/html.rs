@@ -91,9 +91,13 @@ fn difference(result: &FrameResult, frame: Option<&Frame>, text: &str) -> Result
     let made = golden.driver().map(|d| format!("made on {d}")).unwrap_or_default();
     let section = match compare(&image, &golden.image, &CompareOptions::default()) {
         Ok(comparison) => {
-            let now =
-                NamedImage { name: "image", description: "rendered now", image: &image, comparison: Some(&comparison) };
-            let then = NamedImage { name: "golden", description: &made, image: &golden.image, comparison: None };
+            // pictures of golden images are without alpha, so on black both
+            let has_alpha = [&image, &golden.image].iter().all(|image| image.f32("A").is_some());
+            let background = frame.settings.backdrop().colour().filter(|_| has_alpha);
+            let named =
+                |name, description, image, comparison| NamedImage { name, description, image, background, comparison };
+            let now = named("image", "rendered now", &image, Some(&comparison));
+            let then = named("golden", &made, &golden.image, None);
             section(&title, &[now, then], 1)?
         }
         // of different sizes, say: the text has it

@@ -1,6 +1,7 @@
 //! Techniques that a view can show: presets of real-time ambient occlusion and their buffers,
 //! integrators of stills, and the truth of what is beside it.
 
+use crate::integrators::backdrop::Backdrop;
 use crate::integrators::{self, IntegratorName};
 use crate::interface::ToneMap;
 use crate::realtime::display::DisplayMode;
@@ -214,10 +215,16 @@ impl Technique {
         matches!(self, Self::Frames(integrator) | Self::Still(integrator) if integrator.get().sees_environment())
     }
 
-    /// Whether its images can show what a ground catches, and not only a plane: those of stills of
-    /// light and of ambient occlusion.
+    /// Whether its images are on black with this background: ambient occlusion has no environment.
+    pub fn is_on_black(self, background: Backdrop) -> bool {
+        self.integrator().can(Capability::AmbientVisibility) && !background.hides_environment()
+    }
+
+    /// Whether its images can show what a ground catches, and not only a plane: those of light and
+    /// of ambient occlusion, but for Larsen's pipeline.
     pub fn catches_shadows(self) -> bool {
-        let catches = |i: IntegratorName| i.can(Capability::LightTransport) || i.can(Capability::AmbientVisibility);
-        matches!(self, Self::Still(integrator) if catches(integrator))
+        let integrator = self.integrator();
+        let is_caught = integrator.can(Capability::LightTransport) || integrator.can(Capability::AmbientVisibility);
+        is_caught && self != Self::Preset(Preset::Larsen)
     }
 }

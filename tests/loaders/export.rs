@@ -1,6 +1,7 @@
 //! The exporter: what it writes comes back.
 
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
+use serde_json::{Value, json};
 use skylit::Error;
 use skylit::scene::export::{ExportStats, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
@@ -219,6 +220,62 @@ fn gltf_round_trips() {
     // one image for both textures, no temporary files
     let names: Vec<_> = std::fs::read_dir(folder.path("")).unwrap().flatten().map(|f| f.file_name()).collect();
     assert_eq!(names.len(), 2 + 2 * 3, "{names:?}");
+}
+
+/// Groups stay groups, with what is below them in its order and where it was: meshes, a camera and lights among them.
+#[test]
+fn gltf_keeps_the_tree_of_nodes() {
+    let folder = Folder::new();
+    let mut doc = Doc::triangle();
+    doc.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }]);
+    doc.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    doc.json["extensions"] =
+        json!({ "KHR_lights_punctual": { "lights": [{ "type": "point" }, { "type": "spot", "spot": {} }] } });
+    let light = |k: usize| json!({ "KHR_lights_punctual": { "light": k } });
+    doc.json["nodes"] = json!([
+        { "name": "street", "translation": [10, 0, 0.1], "children": [1, 5, 7, 8] },
+        { "name": "car", "mesh": 0, "rotation": [0, 0.6, 0, 0.8], "scale": [1, 2, 3], "children": [2, 3, 4] },
+        { "name": "wheel", "mesh": 0, "translation": [0.1, 0.2, 0.3] },
+        { "name": "lamps", "children": [9, 10] },
+        { "name": "wheel", "mesh": 0, "scale": [-1, 1, 1] },
+        { "name": "tripod", "translation": [0, 1.7, 0], "children": [6] },
+        { "name": "view", "camera": 0 },
+        { "name": "house", "mesh": 0 },
+        { "children": [11] },
+        { "name": "left", "extensions": light(0), "translation": [1, 2, 3] },
+        { "name": "right", "extensions": light(1), "rotation": [0.6, 0, 0, 0.8] },
+        { "name": "tree", "mesh": 0, "children": [12] },
+        { "name": "leaf", "mesh": 0 },
+    ]);
+    let original = doc.load();
+    let shape = |scene: &Scene| {
+        let node = |n: &nodes::SceneNode| (n.name.to_string(), n.parent(), n.end(), n.items());
+        scene.nodes.iter().map(node).collect::<Vec<_>>()
+    };
+    let names: Vec<String> = shape(&original).into_iter().map(|node| node.0).collect();
+    assert_eq!(names, ["street", "car", "lamps", "tripod", "tree"]);
+    for name in ["a.glb", "b.gltf"] {
+        let path = folder.path(name);
+        export_gltf(&original, &path).unwrap();
+        let loaded = load(&path).unwrap();
+        assert!(loaded.report.warnings.is_empty(), "{:?}", loaded.report.warnings);
+        same(&original, &loaded);
+        assert_eq!(shape(&loaded), shape(&original), "{name}");
+    }
+    // other readers see a hierarchy, too
+    let written: Value = serde_json::from_slice(&std::fs::read(folder.path("b.gltf")).unwrap()).unwrap();
+    assert_eq!(written["scenes"][0]["nodes"].as_array().unwrap().len(), 1);
+    let street = written["scenes"][0]["nodes"][0].as_u64().unwrap() as usize;
+    let below: Vec<_> = written["nodes"][street]["children"].as_array().unwrap().iter().collect();
+    let named = |k: &&Value| written["nodes"][k.as_u64().unwrap() as usize]["name"].as_str().unwrap().to_owned();
+    assert_eq!(below.iter().map(named).collect::<Vec<_>>(), ["car", "tripod", "house", "tree"]);
+
+    // what is hidden is left out, and its group stays while it has something
+    let mut fewer = original.clone();
+    fewer.hidden.insert(1);
+    export_gltf(&fewer, &folder.path("c.glb")).unwrap();
+    let loaded = load(&folder.path("c.glb")).unwrap();
+    assert_eq!((loaded.instances.len(), loaded.nodes[1].instances().len()), (5, 2));
 }
 
 /// glTF has no LEDs: the others stay, and it is said.

@@ -2,7 +2,8 @@
 
 use super::*;
 use skylit::integrators::backdrop::Backdrop;
-use skylit::integrators::path::PathKernel;
+use skylit::integrators::path::{PathIntegrator, PathKernel, PixelFilter};
+use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
 use skylit::scene::{EnvironmentMap, Ground, Sphere};
 
 /// A sphere of radius 1 that touches the plane y = 0 at the origin, seen from above at a point at this distance from there.
@@ -134,6 +135,118 @@ fn gpu_shadow_under_sun_and_sky() {
             assert!((mean - expected).abs() < 5.0 * error + 1e-3, "{kind} {sky}: {mean} +- {error}, not {expected}");
             assert!(sky > 0.0 || alpha(&film) == 1.0);
         }
+    }
+    assert_validation_clean(&device);
+}
+
+const FRAME: [u32; 2] = [32, 18];
+
+/// A sphere and its shadow before a sky of colours, under a sun, seen from the side.
+fn shadow() -> (Scene, Option<u32>) {
+    let colours = |k: usize| Vec3::new(0.1, 0.2, 0.4) * (1.0 + (k % 7) as f32);
+    let map = EnvironmentMap {
+        name: "colours".into(),
+        width: 16,
+        height: 8,
+        radiance: (0..128).map(colours).collect(),
+        factor: Vec3::ONE,
+        to_map: DMat3::IDENTITY,
+    };
+    let mut scene = ball(0.0, Environment::Map(map));
+    scene.cameras[0] = Camera::look_at(DVec3::new(1.0, 4.0, 6.0), DVec3::Y * 0.5, DVec3::Y, 0.7);
+    scene.lights = vec![sun(3.0, DVec3::new(1.0, -2.0, 0.5))];
+    caught(scene, 0.0)
+}
+
+fn frame_options(catcher: Option<u32>, backdrop: Backdrop, spp: u32, filter: PixelFilter) -> PathOptions {
+    let samples = SampleSettings { pixel_filter: filter, ..SampleSettings::new(FRAME, spp, 5) };
+    PathOptions { samples, catcher, backdrop, ..Default::default() }
+}
+
+fn rmse(a: &[f32], b: &[f32]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    (sum / a.len() as f64).sqrt()
+}
+
+/// Without history and filter a frame in real time is the still of its samples, alpha included, by every tracer.
+#[test]
+fn gpu_frames_catch_what_stills_do() {
+    let device = device();
+    let (scene, catcher) = shadow();
+    let flat = FlatScene::for_paths(&scene);
+    let camera = CameraRecord::new(&scene.cameras[0], flat.origin, 16.0 / 9.0);
+    let filter = Filter { kind: FilterKind::None, radius: 0, samples: 0.0 };
+    let settings = Settings { rays_per_pixel: 12, history: 1, filter, seed: 5, ..Preset::Balanced.settings() };
+    for backdrop in [Backdrop::Map, Backdrop::Transparent] {
+        let options = frame_options(catcher, backdrop, 12, PixelFilter::Centre);
+        for kind in tracers(&device) {
+            let tracer = tracer(&device, kind, &flat);
+            let still = render(&tracer, &flat, &options).image.film;
+            let mut frames = Realtime::radiance(&tracer, &flat, FRAME, &settings, &options).unwrap();
+            frames.frame(&tracer, &camera, &[]).unwrap();
+            let (image, coverage) = (frames.result().unwrap(), frames.coverage().unwrap());
+            for (k, (got, want)) in image.iter().zip(&still.mean).enumerate() {
+                let limit = 2e-5 * want.abs().max(0.01);
+                assert!((got - want).abs() <= limit, "{kind} {backdrop}: value {k} is {got}, of a still {want}");
+            }
+            for (k, (got, want)) in coverage.iter().zip(&still.coverage).enumerate() {
+                assert!((got - want).abs() <= 1e-5, "{kind} {backdrop}: alpha {k} is {got}, of a still {want}");
+            }
+            let partly = coverage.iter().filter(|a| (0.1..0.9).contains(*a)).count();
+            assert!(partly > 20, "{kind}: {partly} pixels are in the shadow");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// At rest the filtered shadow becomes that of a still of as many samples, before a sky and before nothing; a camera that moves has a shadow with little noise.
+#[test]
+fn gpu_frames_at_rest_catch_what_a_still_does() {
+    let device = device();
+    let (scene, catcher) = shadow();
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let at = |x: f64| {
+        let mut camera = scene.cameras[0].clone();
+        camera.camera_to_world = DAffine3::from_translation(DVec3::X * x) * camera.camera_to_world;
+        CameraRecord::new(&camera, flat.origin, 16.0 / 9.0)
+    };
+    let settings = Settings { antialias: true, converge: true, ..Preset::Balanced.settings() };
+    for backdrop in [Backdrop::Map, Backdrop::Transparent] {
+        let options = frame_options(catcher, backdrop, 4096, PixelFilter::Box);
+        let mut integrator = PathIntegrator::new(&tracer, &flat, &options).unwrap();
+        let mut still = |camera: &CameraRecord, spp, seed| {
+            let film = integrator.render(&tracer, camera, spp, seed, &mut NoControl).unwrap().image.film;
+            (film.mean, film.coverage)
+        };
+        let mut frames = Realtime::radiance(&tracer, &flat, FRAME, &settings, &options).unwrap();
+
+        // in motion: noise of one path a pixel would be an error of 0.3 in the shadow
+        for k in 0..24 {
+            frames.frame(&tracer, &at(0.01 * f64::from(k)), &[]).unwrap();
+        }
+        let last = at(0.23);
+        let (truth, truth_alpha) = still(&last, 4096, 1);
+        let moving = rmse(&frames.coverage().unwrap(), &truth_alpha);
+        assert!(frames.coverage().unwrap().iter().all(|a| (0.0..=1.0).contains(a)));
+
+        // at rest
+        for _ in 0..64 {
+            frames.frame(&tracer, &last, &[]).unwrap();
+        }
+        let samples = frames.shown_samples();
+        let (same, same_alpha) = still(&last, samples, 2);
+        let errors = [rmse(&frames.result().unwrap(), &truth), rmse(&frames.coverage().unwrap(), &truth_alpha)];
+        let expected = [rmse(&same, &truth), rmse(&same_alpha, &truth_alpha)];
+        println!(
+            "{backdrop}: alpha in motion {moving:.4}; at rest {errors:.5?}, of a still of {samples} samples {expected:.5?}"
+        );
+        assert!(moving < 0.06, "{backdrop}: {moving}");
+        // as for light on surfaces: the mean of frames weighs later ones more than earlier ones
+        assert!(
+            (0..2).all(|k| errors[k] <= 1.6 * expected[k] + 1e-5),
+            "{backdrop}: {errors:?}, of a still {expected:?}"
+        );
     }
     assert_validation_clean(&device);
 }

@@ -6,6 +6,7 @@ mod common;
 
 mod bent;
 mod bias;
+mod catcher;
 // it runs the program
 #[cfg(feature = "cli")]
 mod cli;

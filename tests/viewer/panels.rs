@@ -920,12 +920,25 @@ fn backgrounds_and_grounds_are_chosen() {
     let flags = settings.flags().join(" ");
     assert!(flags.contains("--background blurred") && flags.contains("--ground catcher"), "{flags}");
 
-    // ambient occlusion has no environment to blur, and frames in real time show a plane
-    alone.change(|app| app.first = Technique::Preset(Preset::Balanced));
+    // ambient occlusion has no environment to blur; frames in real time catch, too, but Larsen's show a plane
+    let plane = "What is shown catches no shadows: the ground is a plane.";
+    let frames = Technique::Frames("path".parse().unwrap());
+    let caught = [(Technique::Preset(Preset::Balanced), None), (frames, Some(Backdrop::Blurred))];
+    for (technique, background) in caught {
+        alone.change(|app| app.first = technique);
+        let pane = alone.mailbox.peek().panes[0].clone();
+        assert_eq!((pane.image.background, pane.image.ground), (background, Some(Ground::Catcher)), "{technique:?}");
+        assert!(!alone.shows(plane), "{technique:?}");
+        // occlusion is black, and so is what is behind it
+        assert_eq!(alone.shows("On black no occlusion is seen"), background.is_none(), "{technique:?}");
+        pane.check().unwrap();
+    }
+    alone.change(|app| app.first = Technique::Preset(Preset::Larsen));
     let pane = alone.mailbox.peek().panes[0].clone();
     assert_eq!((pane.image.background, pane.image.ground), (None, Some(Ground::Plane)));
-    assert!(alone.shows("Stills show what the ground catches; frames in real time show a plane."));
+    assert!(alone.shows(plane));
     pane.check().unwrap();
+    alone.change(|app| app.first = Technique::Preset(Preset::Balanced));
     let request = choose(&mut alone, "Background", "Colour");
     assert!(matches!(request.panes[0].image.background, Some(Backdrop::Colour(_))));
     let request = choose(&mut alone, "Background", "The environment");

@@ -84,6 +84,28 @@ wait 1",
     assert!(saved.f32("Y").is_some() && saved.f32("depth.Z").is_some() && saved.metadata("command").is_some());
 }
 
+/// A click on the image while the scene is being rebuilt selects what is there once it is: nothing is deselected. Lights and the ground rebuild it.
+#[test]
+fn gpu_clicks_wait_for_a_scene_that_is_rebuilt() {
+    let folder = tempfile::tempdir().unwrap();
+    run(
+        Some("builtin:stairs"),
+        folder.path(),
+        "wait picture 500
+press 200 250
+wait text:What was clicked on
+click Light
+click Ground
+click Plane
+press 200 250
+wait 5
+wait samples 4 300
+expect What was clicked on
+expect-no-errors",
+    )
+    .unwrap();
+}
+
 /// A file whose light is candela and lux: the first path of it shows something, and says by which exposure; ambient occlusion has none.
 #[test]
 fn gpu_light_of_a_file_is_exposed() {

@@ -62,9 +62,8 @@ fn layer(image: &Image, prefix: &str, counted: &[f32]) -> Image {
 fn images(found: &AoVersusPath) -> Result<Section> {
     let entry = |name: &str, prefix: &str| Entry {
         name: name.into(),
-        description: String::new(),
-        choices: Vec::new(),
         image: layer(&found.image, prefix, &found.counted),
+        ..Entry::default()
     };
     let entries = vec![entry("lit, best fit", ""), entry("direct light", "direct."), entry("path tracing", "path.")];
     let set = ImageSet::new(entries, 2, &CompareOptions::default())?;
@@ -73,6 +72,7 @@ fn images(found: &AoVersusPath) -> Result<Section> {
             name: &e.name,
             description: &e.description,
             image: &e.image,
+            background: None,
             comparison: c.as_ref(),
         })
         .collect();

@@ -11,6 +11,7 @@ use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
 use crate::interface::records::path::PathFrameParams;
 use crate::interface::records::radiance::{GuideRayRecord, MAX_GUIDE_BOUNCES, SurfacesParams};
+use crate::interface::{PathFeature, PathFeatures};
 use crate::scene::material::MaterialKind;
 use crate::scene::{Material, Scene};
 use crate::shaders::{self, LANES};
@@ -48,7 +49,7 @@ impl SignalPaths {
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, capacity: u32) -> Result<Self> {
         Ok(Self {
             paths: PathEstimator::new(tracer, flat, options, capacity, true)?,
-            gather: shaders::PATH_GATHER.pipeline(tracer.device())?,
+            gather: shaders::PATH_GATHER.specialized(tracer.device(), &gather_constants(options))?,
             capacity,
             rr_depth: options.rr_depth,
         })
@@ -212,6 +213,13 @@ impl GuideRays {
             behind.stream.record(r, &behind.queues[traced].push(push(fills), push(fills).count));
         }
     }
+}
+
+/// Constants of the shader that gathers paths: the other features make no difference to it.
+fn gather_constants(options: &PathOptions) -> Specialization {
+    let mut features = PathFeatures::default();
+    features.insert_if(options.catches(), PathFeature::Catcher);
+    Specialization::default().set_all(features.constants())
 }
 
 /// Returns true if a surface of the material may have delta lobes alone, and so show others.

@@ -13,6 +13,8 @@ records! {
         ENTRY_LIST_BYTES: uint = 128;
         /// Bit of the tag of an occlusion ray from a ground that catches shadows.
         CAUGHT: uint = 2147483648;
+        /// Sample of such a ray that nothing occludes; that of a camera ray that misses is -1.
+        CAUGHT_UNOCCLUDED: float = -2.0;
     };
 
     /// Which hits occlude a surface point, and how much.

@@ -9,7 +9,7 @@ records! {
         frame: address,
         /// Axis of the hemisphere: 0 the geometric normal, 1 the shading normal.
         hemisphere: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// The material of a ground that catches shadows; `INVALID`: there is none.
+        catcher: uint,
     }
 }

@@ -13,6 +13,8 @@ records! {
         SIGNAL_ASIDE: float = 1.0;
         /// Phase of a path: it has met a surface that scatters light.
         SIGNAL_SCATTERED: float = 2.0;
+        /// Phase of a path: its camera ray has met a ground that catches shadows, and it has ended.
+        SIGNAL_CAUGHT: float = 3.0;
         /// No distance.
         SIGNAL_UNKNOWN: float = -1.0;
         /// No distance yet.

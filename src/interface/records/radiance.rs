@@ -6,6 +6,9 @@ records! {
     "radiance" includes "queue" values {
         /// Mirrors and panes of glass that the G-buffer's rays follow.
         MAX_GUIDE_BOUNCES: uint = 8;
+        /// The coverage in the G-buffer of a ground that catches shadows, which covers by the light
+        /// that it does not get.
+        COVERS_CAUGHT: float = 2.0;
         /// One of so many pixels is counted to know how many show a surface.
         LIST_PART: uint = 16;
     };

@@ -7,6 +7,7 @@ use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
 use crate::realtime::params::{MAX_MOVED, MovedRecord};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
+use crate::realtime::settings::Settings;
 use crate::shaders;
 use crate::tracer::Tracer;
 
@@ -33,15 +34,15 @@ struct Antialias {
 }
 
 /// The pass over all pixels. `input`: [`Resource::Composed`] or [`Resource::Result`].
-pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> Result<Stage> {
+pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, settings: &Settings) -> Result<Stage> {
     let device = tracer.device();
     let moved_bytes = (MAX_MOVED * size_of::<MovedRecord>()) as u64;
     let pass = Antialias {
-        pipeline: shaders::ANTIALIAS.pipeline(device)?,
+        pipeline: shaders::ANTIALIAS.specialized(device, &settings.catcher_constants())?,
         params: Params::new(device, "parameters of antialiasing")?,
         moved: Buffer::new(device, "moved objects", moved_bytes, Memory::Upload)?,
         input,
-        has_rest,
+        has_rest: settings.converges(),
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }

@@ -1,7 +1,8 @@
 //! `compose`: the radiance of each pixel, of the filtered parts and of what is seen directly.
 
 use crate::error::Result;
-use crate::gpu::{ComputePipeline, Recorder};
+use crate::gpu::{ComputePipeline, Recorder, Specialization};
+use crate::interface::constants;
 use crate::interface::records::radiance::ComposeParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
@@ -17,11 +18,13 @@ struct Compose {
     has_rest: bool,
 }
 
-/// The pass over all pixels. `parts`: images of diffuse reflection and of the rest.
-pub fn stage(tracer: &Tracer, pixels: u32, parts: [Resource; 2], has_rest: bool) -> Result<Stage> {
+/// The pass over all pixels. `parts`: images of diffuse reflection and of the rest. `has_catcher`:
+/// paths may meet a ground that catches shadows.
+pub fn stage(tracer: &Tracer, pixels: u32, parts: [Resource; 2], has_rest: bool, has_catcher: bool) -> Result<Stage> {
     let device = tracer.device();
+    let constants = Specialization::default().set(constants::HAS_CATCHER, has_catcher);
     let pass = Compose {
-        pipeline: shaders::COMPOSE.pipeline(device)?,
+        pipeline: shaders::COMPOSE.specialized(device, &constants)?,
         params: Params::new(device, "parameters of composition")?,
         parts,
         has_rest,

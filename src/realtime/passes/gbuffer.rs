@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::film::block::{Block, BlockParams, PassParams};
 use crate::gpu::Recorder;
 use crate::interface::records::gbuffer::GbufferParams;
+use crate::interface::records::ray::INVALID;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Pass, Range, Stage};
@@ -46,7 +47,11 @@ impl Pass for Gbuffer {
             centre_offset: frame.plan.offset,
             ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
         };
-        let own = GbufferParams { frame: frame.params, hemisphere: self.has_axes.into(), ..Default::default() };
+        let own = GbufferParams {
+            frame: frame.params,
+            hemisphere: self.has_axes.into(),
+            catcher: frame.settings.catcher.unwrap_or(INVALID),
+        };
         self.params.write(&block, &own)
     }
 

@@ -6,6 +6,7 @@ use crate::interface::records::radiance::RestParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, Stage};
 use crate::realtime::resources::{Resource, ResourceUse, Resources};
+use crate::realtime::settings::Settings;
 use crate::shaders;
 use crate::tracer::Tracer;
 
@@ -15,10 +16,10 @@ struct Rest {
 }
 
 /// The pass over all pixels.
-pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
+pub fn stage(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Stage> {
     let device = tracer.device();
     let pass = Rest {
-        pipeline: shaders::REST.pipeline(device)?,
+        pipeline: shaders::REST.specialized(device, &settings.catcher_constants())?,
         params: Params::new(device, "parameters of samples at rest")?,
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
@@ -26,7 +27,8 @@ pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
 
 impl Pass for Rest {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        ResourceUse::new(&[Resource::FrameNumber, Resource::Guide, Resource::Current], &[Resource::Rest])
+        use Resource::{Current, FrameNumber, Guide, Normals, Rest};
+        ResourceUse::new(&[FrameNumber, Guide, Normals, Current], &[Rest])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

@@ -45,10 +45,10 @@ impl Traced {
     fn new(frame: &Frame, most: u32, sample_bits: u32) -> Result<Self> {
         let device = frame.tracer.device();
         Ok(Self {
-            rays: AoRays::new(frame.tracer, frame.settings.occlusion, most, sample_bits, 0, None)?,
+            rays: AoRays::new(frame.tracer, frame.settings.occlusion, most, sample_bits, 0, frame.settings.catcher)?,
             has_entry_points: false,
             block: PassParams::new(device, "block parameters of samples at rest")?,
-            resolve: shaders::REST_SAMPLES.pipeline(device)?,
+            resolve: shaders::REST_SAMPLES.specialized(device, &frame.settings.catcher_constants())?,
             params: Params::new(device, "parameters of samples at rest")?,
         })
     }

@@ -67,7 +67,7 @@ impl Radiance {
             },
             frame_samples,
             extent,
-            stages: stages(tracer, flat, paths, [block, sampled], settings, has_specular)?,
+            stages: stages(tracer, flat, paths, [block, sampled], settings, [has_specular, options.catcher.is_some()])?,
             primary_reason: primary_reason.into(),
         })
     }
@@ -90,7 +90,7 @@ fn stages(
     paths: SignalPaths,
     [block, sampled]: [Block; 2],
     settings: &Settings,
-    has_specular: bool,
+    [has_specular, has_catcher]: [bool; 2],
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let has_rest = settings.converges();
@@ -103,8 +103,8 @@ fn stages(
     ];
     let (filters, filtered) = radiance_filter::stages(tracer, block, settings, has_specular)?;
     stages.extend(filters);
-    stages.push(compose::stage(tracer, pixels, filtered, has_rest)?);
-    stages.push(antialias::stage(tracer, pixels, Resource::Composed, has_rest)?);
+    stages.push(compose::stage(tracer, pixels, filtered, has_rest, has_catcher)?);
+    stages.push(antialias::stage(tracer, pixels, Resource::Composed, settings)?);
     Ok(stages)
 }
 

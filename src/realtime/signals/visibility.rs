@@ -108,15 +108,15 @@ fn stages(
     // samples at rest, for which long frames do without all stages so far
     let has_rest = settings.converges();
     if has_rest {
-        stages.push(rest::stage(tracer, pixels)?);
+        stages.push(rest::stage(tracer, pixels, settings)?);
         if frame_samples.has_long() {
             stages = stages.into_iter().map(Stage::in_short_frames).collect();
             stages.push(rest_samples::stage(block, frame_samples.most(), settings.launch_rays));
         }
         stages.extend(nlmeans::stages(tracer, block.size)?);
     }
-    if has_rest || settings.antialias {
-        stages.push(antialias::stage(tracer, pixels, Resource::Result, has_rest)?);
+    if has_rest || settings.antialias || settings.catcher.is_some() {
+        stages.push(antialias::stage(tracer, pixels, Resource::Result, settings)?);
     }
     Ok(stages)
 }

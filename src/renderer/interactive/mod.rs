@@ -238,11 +238,25 @@ impl<'r> Interactive<'r> {
         }
     }
 
-    /// As [`Self::choose_camera`], errors included, but whatever cameras the file has.
-    pub fn automatic_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
-        if self.traced.is_empty() {
+    /// Returns true once the scene is traced, by a view or [`Self::trace`]: points can be picked.
+    pub fn is_traced(&self) -> bool {
+        !self.traced.is_empty()
+    }
+
+    /// Has the scene traced, without a view.
+    ///
+    /// # Errors
+    /// Those of the device and of `control`.
+    pub fn trace(&mut self, control: &mut dyn Control) -> Result<()> {
+        if !self.is_traced() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
+        Ok(())
+    }
+
+    /// As [`Self::choose_camera`], errors included, but whatever cameras the file has.
+    pub fn automatic_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
+        self.trace(control)?;
         Ok(framing::choose(self.scene, aspect, None, &|rays| self.visible_surfaces(rays))?.camera())
     }
 
@@ -251,9 +265,7 @@ impl<'r> Interactive<'r> {
     /// # Errors
     /// Those of the device.
     pub fn openness(&mut self, camera: &Camera, aspect: f64, control: &mut dyn Control) -> Result<Option<Openness>> {
-        if self.traced.is_empty() {
-            self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
-        }
+        self.trace(control)?;
         let size = self.scene.bounds().map_or(0.0, |(lo, hi)| (hi - lo).length());
         radius::measure(camera, aspect, size, &|rays| self.visible_surfaces(rays))
     }

@@ -1,5 +1,6 @@
 //! glTF 2.0 writer.
 
+mod hierarchy;
 mod rig;
 
 use std::collections::BTreeSet;
@@ -21,7 +22,7 @@ use crate::scene::{
 /// and PNG files of the same name beside it. The extension of `path` decides. Each file appears
 /// only when it is complete, the `.gltf` last.
 ///
-/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras,
+/// Triangles, transforms, the nodes above them, materials (core and KHR_materials extensions), textures, cameras,
 /// punctual lights and animations with skins and morph targets survive a round trip through the
 /// loader (animated scenes are written in their rest pose). Spheres are tessellated, with a
 /// warning, and animations of other values are left out, with another; what glTF cannot express
@@ -128,7 +129,7 @@ impl Writer {
         let rig = scene.rig.as_ref();
 
         // nodes, and lights on those that carry them
-        let mut tree = rig::tree(scene, rig);
+        let mut tree = rig.map_or_else(|| hierarchy::tree(scene), |rig| rig::tree(scene, rig));
         let mut nodes = std::mem::take(&mut tree.nodes);
         let mut roots = std::mem::take(&mut tree.roots);
         let free = nodes.len();
@@ -139,7 +140,7 @@ impl Writer {
         let nothing = ClipPlanes { near: 0.01f64.min(1e-4 * diagonal.max(1e-30)), far: 1e6f64.max(1e3 * diagonal) };
         let cameras: Vec<Value> = scene.cameras.iter().map(|c| camera(c, nothing)).collect();
         nodes.extend(scene.cameras.iter().enumerate().filter_map(|(i, c)| {
-            if rig.is_some_and(|r| rig::carries_camera(r, i).is_some()) {
+            if tree.cameras.contains(&i) {
                 return None;
             }
             let mut node = node(&c.name, &c.camera_to_world);
@@ -487,9 +488,14 @@ fn camera(camera: &Camera, nothing: ClipPlanes) -> Value {
     }
 }
 
-fn light_node(light: &Light, index: usize) -> Value {
+/// The transform of a node that carries a light.
+fn light_place(light: &Light) -> DAffine3 {
     let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, light.direction.try_normalize().unwrap_or(DVec3::NEG_Z));
-    let mut node = node(&light.name, &DAffine3::from_rotation_translation(turn, light.position));
+    DAffine3::from_rotation_translation(turn, light.position)
+}
+
+fn light_node(light: &Light, index: usize) -> Value {
+    let mut node = node(&light.name, &light_place(light));
     put_light(&mut node, index);
     node
 }

@@ -548,7 +548,9 @@ fn ground(app: &mut App, ui: &mut Ui) {
         image.ground_height = None;
     }
     if chosen == Ground::Catcher && !app.first.catches_shadows() {
-        ui.label("Stills show what the ground catches; frames in real time show a plane.");
+        ui.label("What is shown catches no shadows: the ground is a plane.");
+    } else if chosen == Ground::Catcher && app.first.is_on_black(app.settings.image.background.unwrap_or_default()) {
+        ui.label("On black no occlusion is seen: choose a colour as background.");
     }
 }
 

@@ -736,7 +736,12 @@ impl ViewerSession<'_> {
                 Err(Error::Usage(_)) => {}
                 outcome => outcome?,
             },
+            // of a scene that is being rebuilt, say for another environment
+            Task::Pick { .. } if !self.interactive.is_traced() && self.next_pane(false, request).is_some() => {
+                return Ok(false);
+            }
             Task::Pick { at, purpose } => {
+                self.interactive.trace(&mut NoControl)?;
                 let pick = self.interactive.pick(camera, *at, request.aspect())?;
                 self.events.send(Event::Picked(*purpose, Box::new(pick)));
             }

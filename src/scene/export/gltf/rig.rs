@@ -1,6 +1,6 @@
 //! Export of the node hierarchy, skins, morph targets and animations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::DMat4;
@@ -13,6 +13,7 @@ use crate::scene::animation::{
 use crate::scene::{AnimationRig, Scene};
 
 /// The node hierarchy that is being written.
+#[derive(Default)]
 pub(super) struct Tree {
     pub nodes: Vec<Value>,
     /// Nodes without a parent, in an order in which loaders meet the instances in that of the
@@ -21,22 +22,18 @@ pub(super) struct Tree {
     /// For each node of the rig, the written nodes whose meshes have morph targets with its
     /// weights.
     morphing: BTreeMap<usize, Vec<usize>>,
-    /// The written nodes of the lights that the rig carries.
+    /// The written nodes of lights.
     pub lights: BTreeMap<usize, usize>,
+    /// The cameras that nodes carry.
+    pub cameras: BTreeSet<usize>,
 }
 
 /// The nodes of all instances, and of the cameras and lights that the rig carries.
-pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
-    let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new(), lights: BTreeMap::new() };
-    let Some(rig) = rig else {
-        tree.nodes = scene.shown_instances().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
-        tree.roots = (0..tree.nodes.len()).collect();
-        return tree;
-    };
-
+pub(super) fn tree(scene: &Scene, rig: &AnimationRig) -> Tree {
     // nodes with their children
     let parts = rig.parts();
-    tree.nodes = parts.nodes.iter().map(|n| local(&n.name, &n.local)).collect();
+    let nodes = parts.nodes.iter().map(|n| local(&n.name, &n.local)).collect();
+    let mut tree = Tree { nodes, ..Tree::default() };
     // the first instance in each tree
     let mut first: BTreeMap<usize, usize> = BTreeMap::new();
     let mut above = Vec::with_capacity(parts.nodes.len());
@@ -81,6 +78,7 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
         if let Some(on) = carries_camera(rig, c) {
             let at = tree.carrier(on, &camera.name, "camera");
             tree.nodes[at]["camera"] = json!(c);
+            tree.cameras.insert(c);
         }
     }
     for (l, light) in scene.lights.iter().enumerate() {
@@ -97,7 +95,7 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
 }
 
 /// The node of the rig that carries a camera.
-pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize> {
+fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize> {
     rig.parts().cameras.get(camera).copied().flatten()
 }
 
@@ -254,7 +252,7 @@ fn local(name: &str, local: &LocalTransform) -> Value {
 }
 
 /// Appends to an array that is made when needed: empty ones are not allowed.
-fn push(object: &mut Value, key: &str, value: Value) {
+pub(super) fn push(object: &mut Value, key: &str, value: Value) {
     match object.get_mut(key).and_then(Value::as_array_mut) {
         Some(array) => array.push(value),
         None => object[key] = json!([value]),
