@@ -4,8 +4,8 @@
 #   ./scripts/other_systems.sh             Windows (MSVC) and macOS, from any system
 #   ./scripts/other_systems.sh native      this system: what CI runs on Windows and macOS, with shaderc from source
 #
-# C and C++ that crates compile (meshoptimizer) is left out where it is for another system: their compilers are replaced by a command that does nothing.
-# `cargo check` reads no objects. Shaders are not compiled either (live-shaders): they are the same on all systems. So this finds Rust that does not
+# C and C++ that crates compile (meshoptimizer) is left out where it is for another system: their compilers are replaced by a command that does
+# nothing but leave empty files. `cargo check` reads no objects. Shaders are not compiled either (live-shaders): they are the same on all systems. So this finds Rust that does not
 # compile there, and says nothing of what a linker or a driver would say.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -25,7 +25,14 @@ if [ "${1:-}" = native ]; then
   exit
 fi
 
-nothing=$(command -v true)
+# the archiver of MSVC has to leave a file
+nothing=$(mktemp)
+trap 'rm -f "$nothing"' EXIT
+cat > "$nothing" <<'STUB'
+#!/bin/sh
+for word; do case $word in [-/]out:*|[-/]OUT:*) : > "${word#?????}" ;; esac; done
+STUB
+chmod +x "$nothing"
 for target in x86_64-pc-windows-msvc aarch64-apple-darwin; do
   if command -v rustup >/dev/null; then rustup target add "$target" >/dev/null; fi
   variable=${target//-/_}

@@ -63,7 +63,7 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
 
-    /// The same, of work whose finished parts are kept; the text says how it goes on.
+    /// The user did so, and finished parts of the work are kept; the text says how it goes on.
     #[error("interrupted: {0}")]
     Paused(String),
 

@@ -308,7 +308,7 @@ struct Baker<'a> {
     frames: Vec<Option<SurfaceFrames<'a>>>,
     /// The meshes of a detailed model.
     detailed: Vec<Option<SurfaceFrames<'a>>>,
-    /// What finds points of it.
+    /// The rays that find points of it.
     projector: Option<Projector<'a>>,
     /// Rays out of the surface, and into it.
     outward: Option<PointTracer<'a>>,

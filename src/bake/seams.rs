@@ -43,8 +43,8 @@ pub struct SeamLookups {
 
 /// A lookup on one side of a seam less that on the other side, at the same point of the surface.
 struct LookupPair {
-    /// Texels and their weights, those of the other side negative. Weights of texels that both sides
-    /// read are added up, and the entries that this leaves have no weight.
+    /// Texels and their weights, those of the other side negative. Weights of a texel that both
+    /// sides read are added up, and the entries that this leaves have no weight.
     terms: [(u32, f32); TERMS],
     /// Length of the seam that it stands for, in object space.
     length: f64,

@@ -21,7 +21,6 @@ use crate::integrators::{self, IntegratorName, IntegratorSettings, PictureOption
 #[cfg(feature = "cli")]
 use crate::output::parse_size;
 use crate::output::tone_map::ToneMap;
-#[cfg(feature = "cli")]
 use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::camera::ViewHeight;
