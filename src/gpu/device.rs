@@ -108,7 +108,7 @@ impl Device {
             create = create.push_next(&mut f_query);
         }
         if info.is_portability_subset {
-            // Vulkan wants it enabled where it is, with none of the features that are optional in it
+            // Vulkan wants it enabled where it is; features that are optional in it stay off
             extensions.push(khr::portability_subset::NAME.as_ptr());
         }
         create = create.enabled_extension_names(&extensions);

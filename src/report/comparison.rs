@@ -366,7 +366,8 @@ mod tests {
         assert!(section("", &[named], 0).is_err());
     }
 
-    /// What alpha leaves open shows the colour, also of grey images; without a colour values are the image's, to the bit.
+    /// The colour shows where alpha leaves it open, also of grey images. Without a colour values
+    /// are the image's, to the bit.
     #[test]
     fn images_are_shown_on_their_background() {
         let channel = |name: &str, values: &[f32]| Channel::from_floats(name, values.to_vec());

@@ -22,11 +22,12 @@ use crate::scene::{
 /// and PNG files of the same name beside it. The extension of `path` decides. Each file appears
 /// only when it is complete, the `.gltf` last.
 ///
-/// Triangles, transforms, the nodes above them, materials (core and KHR_materials extensions), textures, cameras,
-/// punctual lights and animations with skins and morph targets survive a round trip through the
-/// loader (animated scenes are written in their rest pose). Spheres are tessellated, with a
-/// warning, and animations of other values are left out, with another; what glTF cannot express
-/// (the environment, render settings, the `.brhan` kind of a material) is left out.
+/// Triangles, transforms, the nodes above them, materials (core and KHR_materials extensions),
+/// textures, cameras, punctual lights and animations with skins and morph targets survive a round
+/// trip through the loader (animated scenes are written in their rest pose). Spheres are
+/// tessellated, with a warning, and animations of other values are left out, with another; what
+/// glTF cannot express (the environment, render settings, the `.brhan` kind of a material) is left
+/// out.
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.
