@@ -61,7 +61,8 @@ def visit(rng: random.Random, techniques: Deck, tracers: Deck, folder: Path, num
         [f"press {x()} {y()}", "key F", "key B", f"press {x()} {y()} left 2", "wait 1"],
         ["key U", "wait 1", "key U"],
         # the panel
-        ["click Radius", "wait 1", *slide("Radius"), "set Radius = 0.7", "wait 1", "click Radius"],
+        # Enter ends the edit of the number, which would take the next keys
+        ["click Radius", "wait 1", *slide("Radius"), "set Radius = 0.7", "wait 1", "click Radius", "key Enter"],
         ["click Light", *slide("Exposure"), "click Light"],
         ["key X", "wait 1", "drag-control Line between the images -60 0 0.3", "wait 0.5", "key X"],
         ["key T", "wait 5", "key Space", "wait 0.5", "key Space", "key T"],
