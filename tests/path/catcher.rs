@@ -49,19 +49,17 @@ fn alpha(film: &Film) -> f64 {
     film.coverage.iter().map(|a| f64::from(*a)).sum::<f64>() / film.coverage.len() as f64
 }
 
+/// A sky of seven colours.
+fn colours() -> EnvironmentMap {
+    let colour = |k: usize| Vec3::new(0.1, 0.2, 0.4) * (1.0 + (k % 7) as f32);
+    EnvironmentMap::new("colours", [16, 8], (0..128).map(colour).collect())
+}
+
 /// Where nothing is occluded, the image is that without a ground, to the bit, before any environment and under any lights.
 #[test]
 fn gpu_unoccluded_catchers_show_what_is_behind() {
     let device = device();
-    let colours = |k: usize| Vec3::new(0.1, 0.2, 0.4) * (1.0 + (k % 7) as f32);
-    let map = Environment::Map(EnvironmentMap {
-        name: "colours".into(),
-        width: 16,
-        height: 8,
-        radiance: (0..128).map(colours).collect(),
-        factor: Vec3::ONE,
-        to_map: DMat3::IDENTITY,
-    });
+    let map = Environment::Map(colours());
     for environment in [Environment::Uniform(Vec3::new(0.25, 0.5, 1.0)), map, Environment::Black] {
         let has_sky = environment != Environment::Black;
         let mut scene = ball(0.0, environment);
@@ -143,16 +141,7 @@ const FRAME: [u32; 2] = [32, 18];
 
 /// A sphere and its shadow before a sky of colours, under a sun, seen from the side.
 fn shadow() -> (Scene, Option<u32>) {
-    let colours = |k: usize| Vec3::new(0.1, 0.2, 0.4) * (1.0 + (k % 7) as f32);
-    let map = EnvironmentMap {
-        name: "colours".into(),
-        width: 16,
-        height: 8,
-        radiance: (0..128).map(colours).collect(),
-        factor: Vec3::ONE,
-        to_map: DMat3::IDENTITY,
-    };
-    let mut scene = ball(0.0, Environment::Map(map));
+    let mut scene = ball(0.0, Environment::Map(colours()));
     scene.cameras[0] = Camera::look_at(DVec3::new(1.0, 4.0, 6.0), DVec3::Y * 0.5, DVec3::Y, 0.7);
     scene.lights = vec![sun(3.0, DVec3::new(1.0, -2.0, 0.5))];
     caught(scene, 0.0)
