@@ -1,8 +1,9 @@
-// The compute tracer without a BVH: every ray against every primitive of every instance. For tests, as the simplest implementation,
-// and to show what a BVH saves. It supplies main() around the stream's ray(),
-// closest() or any().
+// The compute tracer's kernel without a BVH: every ray against every primitive of every instance. For tests, as the simplest implementation,
+// and to show what a BVH saves. generate.glsl has made the rays, and deliver.glsl passes the hits on.
 #ifndef TRACE_BRUTE
 #define TRACE_BRUTE
+#include "scene/scene.glsl"
+#include "trace/launch.glsl"
 #include "trace/primitive.glsl"
 #include "trace/spread.glsl"
 
@@ -14,7 +15,7 @@ void main() {
     if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     uvec2 primitives = root.primitives;
-    Ray world = ray(push.first + k);
+    Ray world = load_ray(push.rays, k);
     float best = world.tmax;
     uint best_instance = INVALID;
     uint best_primitive = INVALID;
@@ -53,11 +54,9 @@ void main() {
     }
     bool met = best_primitive != INVALID;
 #ifdef STREAM_ANY
-    any(push.first + k, met);
+    store_any(root.launch_hits, k, met);
 #else
-    Hit hit = miss();
-    if (met) hit = scene_hit(best, best_instance, best_primitive, best_uv);
-    closest(push.first + k, hit);
+    store_closest(root.launch_hits, k, met ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
 }
 

@@ -1,4 +1,5 @@
-// Last step of a launch of the fast kernel: delivers the hits to the stream.
+// Last step of a launch: delivers the hits to the stream. Where another pass has traced the same rays, it is the only step, and the stream finds
+// their hits itself: known_hit(), by the index of a ray.
 #ifndef TRACE_DELIVER
 #define TRACE_DELIVER
 #include "trace/launch.glsl"
@@ -15,7 +16,14 @@ void main() {
     any(push.first + k, is_finished(root, k) && load_any(root, k));
 #else
     Hit hit = miss();
-    if (is_finished(root, k)) hit = load_closest(root, k);
+#ifdef KNOWN_HITS
+    if (HITS_ARE_KNOWN) {
+        hit = known_hit(push.first + k);
+    } else
+#endif
+    if (is_finished(root, k)) {
+        hit = load_closest(root, k);
+    }
     closest(push.first + k, hit);
 #endif
 }

@@ -1,11 +1,13 @@
-// The compute tracer's simple kernel: a two-level binary BVH, one ray per lane. It supplies main() around the
-// stream's ray(), closest() or any(). The fast kernel is wide.glsl.
+// The compute tracer's simple kernel: a two-level binary BVH, one ray per lane. generate.glsl has made the rays, and
+// deliver.glsl passes the hits on. The fast kernel is wide.glsl.
 //
 // Two orders of the children, after Coello's study (2024; docs/design/tracers.md): first the one whose box the ray enters first, or first the one
 // that comes first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE
+#include "scene/scene.glsl"
 #include "trace/areas.glsl"
+#include "trace/launch.glsl"
 #include "trace/primitive.glsl"
 #include "trace/slab.glsl"
 #include "trace/spread.glsl"
@@ -19,7 +21,6 @@ layout(local_size_x = LANES) in;
 const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
 const uint LAST_NODE = 0x7ffffff0u;
-layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 
 // Distance before which a ray's boxes are skipped: where it left an influence area, in whose tree all before it was found.
 #define BOX_START (HAS_AREAS ? start : world.tmin)
@@ -62,18 +63,15 @@ void main() {
     InstanceRecords instances = InstanceRecords(root.instances);
     AreasRecord areas = AreasRecord(root.areas);
 
-    // Some CPU drivers leave any loop after 65,535 iterations. Rays that are not done when the loop ends are counted, and the host
-    // reports them: their callbacks were not called.
-    uint left = (end - next + LANES - 1u) / LANES;
-
+    // Some CPU drivers leave any loop after 65,535 iterations. Rays that are not done when the loop ends stay unfinished: they are
+    // counted where hits are delivered, and the host reports them.
     uint stack[STACK_SIZE];
 #ifndef STREAM_ANY
     float stack_near[STACK_SIZE];
 #endif
     uint depth = 0u;
 
-    uint index = push.first + next;
-    Ray world = ray(index);
+    Ray world = load_ray(push.rays, next);
     Shear shear = make_shear(world.direction);
     vec3 origin = world.origin;
     vec3 direction = world.direction;
@@ -202,17 +200,13 @@ void main() {
         if (current == FINISHED) {
             bool met = best_primitive != INVALID;
 #ifdef STREAM_ANY
-            any(index, met);
+            store_any(root.launch_hits, next, met);
 #else
-            Hit hit = miss();
-            if (met) hit = scene_hit(best, best_instance, best_primitive, best_uv);
-            closest(index, hit);
+            store_closest(root.launch_hits, next, met ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
-            left--;
             next += LANES;
             if (next >= end) break;
-            index = push.first + next;
-            world = ray(index);
+            world = load_ray(push.rays, next);
             shear = make_shear(world.direction);
             origin = world.origin;
             direction = world.direction;
@@ -225,7 +219,6 @@ void main() {
             BEGIN_RAY
         }
     }
-    if (left != 0u) atomicAdd(Counter(root.unfinished).v, left);
 }
 
 #endif

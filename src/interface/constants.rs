@@ -65,6 +65,10 @@ constants! {
     MAX_ITERATIONS: uint = 0;
     #[doc = "Influence areas have trees of their own, in the binary kernels."]
     HAS_AREAS: bool = false;
+    #[doc = "Another pass has traced the rays of the stream."]
+    HITS_ARE_KNOWN: bool = false;
+    #[doc = "The rays of the stream are in a queue, and not those that its shader would generate."]
+    RAYS_ARE_QUEUED: bool = false;
     #[doc = "Bent normals are computed."]
     BENT_NORMALS: bool = false;
     #[doc = "Steps of the filter have strides: pixels between taps are left out."]

@@ -21,7 +21,8 @@ use std::borrow::Cow;
 
 pub use registry::*;
 pub use source::{
-    ComputeShader, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Shader, Source, Stage, StreamShaders, Variant,
+    ComputeShader, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Shader, Source, Stage, StreamShaders, Traversal,
+    Variant,
 };
 pub(crate) use specialize::specialize;
 
@@ -102,15 +103,13 @@ mod tests {
     fn variants_are_those_that_apply() {
         for (k, variant) in Variant::ALL.into_iter().enumerate() {
             assert_eq!(variant as usize, k, "{variant:?} stands where its number says");
-            let source = Source::Stream { pass: "path_camera", mode: Mode::Closest, variant };
-            assert_eq!(PATH_CAMERA_CLOSEST.variant(variant), Some(Shader::new(source)));
+            let source = Source::Stream { pass: "aov", mode: Mode::Closest, rays: Rays::CameraOrRasterized, variant };
+            assert_eq!(AOV_CLOSEST.variant(variant), Some(Shader::new(source)));
         }
         assert!(
             OCCLUSION_ANY.variant(Variant::Packet).is_none() && OCCLUSION_ANY.variant(Variant::Generate64).is_none()
         );
-        assert!(
-            PRIMARY_CLOSEST.variant(Variant::Known).is_none() && PRIMARY_CLOSEST.variant(Variant::Visibility).is_some()
-        );
+        assert!(PRIMARY_CLOSEST.variant(Variant::Visibility).is_none());
         assert!(RAYS_ANY.variant(Variant::Visibility).is_none() && RAYS_ANY.variant(Variant::Packet).is_some());
         assert_eq!(OCCLUSION_ANY.name(), "occlusion any");
         assert_eq!(RAYS_ANY.steps(), ["rays generate", "rays trace", "rays deliver"]);
@@ -136,7 +135,13 @@ mod tests {
     fn every_shader_is_spirv() {
         // a program that compiles shaders when it runs would take minutes for all
         let shaders = if cfg!(feature = "live-shaders") {
-            vec![MISS, DRAW_SPHERE, RESOLVE.variant(true), RESOLVE.variant(false), wide_kernel(Mode::Any, true)]
+            vec![
+                MISS,
+                DRAW_SPHERE,
+                RESOLVE.variant(true),
+                RESOLVE.variant(false),
+                kernel(Traversal::Wide, Mode::Any, true),
+            ]
         } else {
             list_shaders()
         };

@@ -2,21 +2,21 @@
 //! build.rs includes this file and compiles what the lists name.
 
 use super::source::Mode::{self, Any, Closest};
-use super::source::Rays::{Camera, CameraOrKnown, Generated, Queue};
-use super::source::{ComputeShader, Shader, Source, Stage, StreamShaders};
+use super::source::Rays::{Camera, CameraOrKnown, CameraOrRasterized, Generated, Queue};
+use super::source::{ComputeShader, Shader, Source, Stage, StreamShaders, Traversal};
 
 /// Occlusion rays of a frame, for ambient occlusion without a falloff.
 pub static AO_TRACE_ANY: StreamShaders = StreamShaders::new("ao_trace", Any, Generated);
 /// Occlusion rays of a frame, for ambient occlusion with a falloff.
 pub static AO_TRACE_CLOSEST: StreamShaders = StreamShaders::new("ao_trace", Closest, Generated);
 /// Camera rays of auxiliary outputs.
-pub static AOV_CLOSEST: StreamShaders = StreamShaders::new("aov", Closest, Camera);
+pub static AOV_CLOSEST: StreamShaders = StreamShaders::new("aov", Closest, CameraOrRasterized);
 /// Occlusion rays from the points of texels, for ambient occlusion without a falloff.
 pub static BAKE_ANY: StreamShaders = StreamShaders::new("bake", Any, Generated);
 /// Occlusion rays from the points of texels, with a falloff, and rays of thickness.
 pub static BAKE_CLOSEST: StreamShaders = StreamShaders::new("bake", Closest, Generated);
 /// Camera rays of a frame's G-buffer.
-pub static GBUFFER_CLOSEST: StreamShaders = StreamShaders::new("gbuffer", Closest, Camera);
+pub static GBUFFER_CLOSEST: StreamShaders = StreamShaders::new("gbuffer", Closest, CameraOrRasterized);
 /// Shadow rays of Larsen (2019).
 pub static LARSEN_LIGHT_ANY: StreamShaders = StreamShaders::new("larsen_light", Any, Generated);
 /// Occlusion rays of Larsen (2019).
@@ -26,19 +26,23 @@ pub static OCCLUSION_ANY: StreamShaders = StreamShaders::new("occlusion", Any, Q
 /// Occlusion rays of a still, for ambient occlusion with a falloff.
 pub static OCCLUSION_CLOSEST: StreamShaders = StreamShaders::new("occlusion", Closest, Queue);
 /// Rays from one path vertex to the next.
-pub static PATH_BOUNCE_CLOSEST: StreamShaders = StreamShaders::new("path_bounce", Closest, Queue);
+pub static PATH_BOUNCE_CLOSEST: StreamShaders =
+    StreamShaders::new("path_bounce", Closest, Queue).sharing("path_vertex", CameraOrKnown);
 /// Camera rays of paths.
-pub static PATH_CAMERA_CLOSEST: StreamShaders = StreamShaders::new("path_camera", Closest, CameraOrKnown);
+pub static PATH_CAMERA_CLOSEST: StreamShaders =
+    StreamShaders::new("path_camera", Closest, CameraOrKnown).sharing("path_vertex", CameraOrKnown);
 /// Distances along rays of ambient light.
 pub static PATH_DISTANCE_CLOSEST: StreamShaders = StreamShaders::new("path_distance", Closest, Queue);
 /// Rays of the G-buffer behind mirrors and glass.
-pub static PATH_REFLECTION_CLOSEST: StreamShaders = StreamShaders::new("path_reflection", Closest, Queue);
+pub static PATH_REFLECTION_CLOSEST: StreamShaders =
+    StreamShaders::new("path_reflection", Closest, Queue).sharing("path_guide", Camera);
 /// Shadow rays of paths.
 pub static PATH_SHADOW_ANY: StreamShaders = StreamShaders::new("path_shadow", Any, Queue);
 /// Shadow rays of paths that pass through thin walls.
 pub static PATH_SHADOW_WALLS_CLOSEST: StreamShaders = StreamShaders::new("path_shadow_walls", Closest, Queue);
 /// Camera rays of the G-buffer of frames of light.
-pub static PATH_SURFACE_CLOSEST: StreamShaders = StreamShaders::new("path_surface", Closest, Camera);
+pub static PATH_SURFACE_CLOSEST: StreamShaders =
+    StreamShaders::new("path_surface", Closest, Camera).sharing("path_guide", Camera);
 /// Camera rays of ambient occlusion.
 pub static PRIMARY_CLOSEST: StreamShaders = StreamShaders::new("primary", Closest, Camera);
 /// Given rays: whether each is occluded.
@@ -188,20 +192,32 @@ pub const STAGES: &[&Shader] = &[
     &DRAW_SPHERE,
 ];
 
-/// The compute tracer's wide kernel, which all streams of a mode share.
-/// `ballot`: for devices with 64-bit integers and subgroup ballots.
-pub const fn wide_kernel(mode: Mode, ballot: bool) -> Shader {
-    Shader::new(Source::Kernel { mode, ballot })
+/// A kernel of the compute tracer, which all streams of a mode share. `ballot`: for devices with
+/// 64-bit integers and subgroup ballots, of which only the wide kernel makes use.
+pub const fn kernel(traversal: Traversal, mode: Mode, ballot: bool) -> Shader {
+    let ballot = ballot && matches!(traversal, Traversal::Wide);
+    Shader::new(Source::Kernel { traversal, mode, ballot })
 }
+
+/// The kernels of the compute tracer, and whether each is for devices with ballots.
+const KERNELS: [(Traversal, bool); 4] =
+    [(Traversal::Wide, false), (Traversal::Wide, true), (Traversal::Binary, false), (Traversal::Brute, false)];
 
 /// Whole paths in one kernel, which traces their rays itself.
 pub const PATH_MEGAKERNEL: Shader = Shader::new(Source::Tracing { pass: "path_megakernel" });
 
-/// Lists all shaders of the program.
+/// Lists all shaders of the program, each once.
 pub fn list_shaders() -> Vec<Shader> {
     let streams = STREAMS.iter().flat_map(|s| s.variants());
     let compute = COMPUTE.iter().flat_map(|c| c.variants());
-    let kernels = [Any, Closest].into_iter().flat_map(|mode| [false, true].map(|ballot| wide_kernel(mode, ballot)));
+    let kernels = [Any, Closest].into_iter().flat_map(|mode| KERNELS.map(|(of, ballot)| kernel(of, mode, ballot)));
     let stages = STAGES.iter().map(|s| **s);
-    streams.chain(compute).chain(stages).chain(kernels).chain([PATH_MEGAKERNEL]).collect()
+    let mut out: Vec<Shader> = Vec::new();
+    for shader in streams.chain(compute).chain(stages).chain(kernels).chain([PATH_MEGAKERNEL]) {
+        // some streams share theirs
+        if !out.contains(&shader) {
+            out.push(shader);
+        }
+    }
+    out
 }

@@ -55,10 +55,11 @@ impl Mode {
 pub enum Rays {
     /// The pass generates them.
     Generated,
-    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility
-    /// can be rasterized instead.
+    /// The pass generates coherent rays: neighbours are traced as packets.
     Camera,
-    /// As [`Rays::Camera`]; or the hits are in memory (shaders/trace/known.glsl).
+    /// As [`Rays::Camera`]; or primary visibility is rasterized instead.
+    CameraOrRasterized,
+    /// As [`Rays::Camera`]; or another pass has traced them, and the hits are in memory.
     CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,
@@ -67,7 +68,7 @@ pub enum Rays {
 impl Rays {
     /// Returns true for rays of which neighbours are alike.
     pub fn are_coherent(self) -> bool {
-        matches!(self, Self::Camera | Self::CameraOrKnown)
+        matches!(self, Self::Camera | Self::CameraOrRasterized | Self::CameraOrKnown)
     }
 }
 
@@ -92,51 +93,39 @@ pub enum Variant {
     Generate,
     /// As [`Variant::Generate`], for devices with 64-bit integers and subgroup ballots.
     Generate64,
-    /// Compute tracer: passes hits to the pass's callback.
+    /// Compute tracer: passes hits to the pass's callback; for every tracer hits that another pass
+    /// has found.
     Deliver,
     /// As [`Variant::Deliver`], for devices with 64-bit integers and subgroup ballots.
     Deliver64,
     /// Compute tracer: traces the rays of a subgroup together.
     Packet,
-    /// Compute tracer: the simple kernel over a binary BVH, written for readability.
-    Bvh2,
-    /// Compute tracer: the `brute` kernel, which tests every primitive of every instance.
-    Brute,
     /// Query tracer.
     Query,
     /// Pipeline tracer.
     Raygen,
     /// No tracer: reads a rasterized visibility buffer.
     Visibility,
-    /// No tracer: reads the hits that another pass has found.
-    Known,
-    /// As [`Variant::Known`], for devices with 64-bit integers and subgroup ballots.
-    Known64,
 }
 
 impl Variant {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 8] = [
         Self::Generate,
         Self::Generate64,
         Self::Deliver,
         Self::Deliver64,
         Self::Packet,
-        Self::Bvh2,
-        Self::Brute,
         Self::Query,
         Self::Raygen,
         Self::Visibility,
-        Self::Known,
-        Self::Known64,
     ];
 
     /// Returns true if streams with this source of rays have this variant.
     pub fn applies_to(self, rays: Rays) -> bool {
         match self {
             Self::Generate | Self::Generate64 | Self::Packet => rays != Rays::Queue,
-            Self::Visibility => rays.are_coherent(),
-            Self::Known | Self::Known64 => rays == Rays::CameraOrKnown,
+            Self::Visibility => rays == Rays::CameraOrRasterized,
             _ => true,
         }
     }
@@ -146,18 +135,15 @@ impl Variant {
             Self::Generate | Self::Generate64 => "trace/generate.glsl",
             Self::Deliver | Self::Deliver64 => "trace/deliver.glsl",
             Self::Packet => "trace/packet.glsl",
-            Self::Bvh2 => "trace/reference.glsl",
-            Self::Brute => "trace/brute.glsl",
             Self::Query => "trace/query.glsl",
             Self::Raygen => "trace/pipeline.glsl",
             Self::Visibility => "trace/visibility.glsl",
-            Self::Known | Self::Known64 => "trace/known.glsl",
         }
     }
 
     fn head(self) -> String {
         match self {
-            Self::Generate64 | Self::Deliver64 | Self::Known64 => format!("{HEAD_64}{HEAD_BALLOT}"),
+            Self::Generate64 | Self::Deliver64 => format!("{HEAD_64}{HEAD_BALLOT}"),
             Self::Packet => format!(
                 "#define KEEPS_CORNERS\n{HEAD_64}{HEAD_BALLOT}#extension GL_KHR_shader_subgroup_arithmetic : require\n#define PACKET_RAYS {PACKET_RAYS}\n"
             ),
@@ -190,6 +176,39 @@ pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<
     made
 }
 
+/// A kernel of the compute tracer that contains no code of a stream: it traces rays in memory, and
+/// stores their hits there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traversal {
+    /// The fast kernel, over a wide BVH.
+    Wide,
+    /// The simple kernel over a binary BVH, written for readability.
+    Binary,
+    /// Every primitive of every instance, without a BVH.
+    Brute,
+}
+
+impl Traversal {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Wide, Self::Binary, Self::Brute];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Wide => "wide",
+            Self::Binary => "binary",
+            Self::Brute => "brute",
+        }
+    }
+
+    fn template(self) -> &'static str {
+        match self {
+            Self::Wide => "trace/wide.glsl",
+            Self::Binary => "trace/reference.glsl",
+            Self::Brute => "trace/brute.glsl",
+        }
+    }
+}
+
 /// The source of a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -199,6 +218,8 @@ pub enum Source {
         pass: &'static str,
         /// The answer to each ray.
         mode: Mode,
+        /// Source of its rays.
+        rays: Rays,
         /// The template.
         variant: Variant,
     },
@@ -209,8 +230,10 @@ pub enum Source {
         /// For devices with 64-bit integers.
         int64: bool,
     },
-    /// The compute tracer's wide kernel, which contains no code of a stream.
+    /// A kernel of the compute tracer.
     Kernel {
+        /// What it traverses.
+        traversal: Traversal,
         /// The answer to each ray.
         mode: Mode,
         /// For devices with 64-bit integers and subgroup ballots.
@@ -236,9 +259,11 @@ impl Source {
     pub fn file_name(&self) -> String {
         let bits = |has_64: &bool| if *has_64 { "64" } else { "32" };
         match self {
-            Self::Stream { pass, mode, variant } => format!("{pass}_{}_{variant:?}", mode.name()),
+            Self::Stream { pass, mode, variant, .. } => format!("{pass}_{}_{variant:?}", mode.name()),
             Self::Compute { pass, int64 } => format!("{pass}_{}", bits(int64)),
-            Self::Kernel { mode, ballot } => format!("wide_{}_{}", mode.name(), bits(ballot)),
+            Self::Kernel { traversal, mode, ballot } => {
+                format!("{}_{}_{}", traversal.name(), mode.name(), bits(ballot))
+            }
             Self::Tracing { pass } => format!("{pass}_tracing"),
             Self::File { path, .. } => path.replace(['/', '.'], "_"),
         }
@@ -283,19 +308,21 @@ impl Source {
         let spread = format!("#define SPREAD {SPREAD}u\n#define RUN {RUN}u\n");
         let head_64 = |int64: bool| if int64 { HEAD_64 } else { "" };
         Ok(match self {
-            Self::Stream { pass, mode, variant } => format!(
-                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"{pass}.glsl\"\n#include \"{}\"\n",
+            Self::Stream { pass, mode, rays, variant } => format!(
+                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}{}#include \"{pass}.glsl\"\n#include \"{}\"\n",
                 variant.head(),
                 mode.define(),
+                if *rays == Rays::CameraOrKnown { "#define KNOWN_HITS\n" } else { "" },
                 variant.template()
             ),
             Self::Compute { pass, int64 } => {
                 format!("#version 460\n{EXTENSIONS}{}{lanes}#include \"{pass}.glsl\"\n", head_64(*int64))
             }
-            Self::Kernel { mode, ballot } => format!(
-                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"trace/wide.glsl\"\n",
+            Self::Kernel { traversal, mode, ballot } => format!(
+                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"{}\"\n",
                 if *ballot { format!("{HEAD_64}{HEAD_BALLOT}") } else { String::new() },
-                mode.define()
+                mode.define(),
+                traversal.template()
             ),
             Self::Tracing { pass } => {
                 format!("#version 460\n{EXTENSIONS}{HEAD_64}{HEAD_BALLOT}{lanes}{spread}#include \"{pass}.glsl\"\n")
@@ -312,11 +339,13 @@ impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let bits = |int64: &bool| if *int64 { "64" } else { "32" };
         match self {
-            Self::Stream { pass, mode, variant } => {
+            Self::Stream { pass, mode, variant, .. } => {
                 write!(f, "{pass}.glsl as {} ({})", variant.template(), mode.name())
             }
             Self::Compute { pass, int64 } => write!(f, "{pass}.glsl ({}-bit loads)", bits(int64)),
-            Self::Kernel { mode, ballot } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(ballot)),
+            Self::Kernel { traversal, mode, ballot } => {
+                write!(f, "{} ({}, {}-bit loads)", traversal.template(), mode.name(), bits(ballot))
+            }
             Self::Tracing { pass } => write!(f, "{pass}.glsl (traces its rays)"),
             Self::File { path, .. } => f.write_str(path),
         }
@@ -348,12 +377,15 @@ impl Shader {
 
 /// A pass that traces rays: a shader for each tracer and step.
 pub struct StreamShaders {
-    /// File in shaders/, without its ending; label of its timings if the stream is a single shader.
+    /// Label of its timings if the stream is a single shader.
     pub pass: &'static str,
     /// The answer to each ray.
     pub mode: Mode,
     /// Source of its rays.
     pub rays: Rays,
+    // file in shaders/, without its ending, and the source of rays that it is compiled for
+    file: &'static str,
+    compiled_for: Rays,
     labels: OnceLock<Labels>,
 }
 
@@ -366,7 +398,14 @@ struct Labels {
 impl StreamShaders {
     /// The pass `shaders/PASS.glsl` in a mode.
     pub const fn new(pass: &'static str, mode: Mode, rays: Rays) -> Self {
-        Self { pass, mode, rays, labels: OnceLock::new() }
+        Self { pass, mode, rays, file: pass, compiled_for: rays, labels: OnceLock::new() }
+    }
+
+    /// The same of `shaders/FILE.glsl`, which another stream has, too: rays of which one has them in
+    /// a queue, and the other generates them (`RAYS_ARE_QUEUED`). `rays`: those that are generated.
+    pub const fn sharing(mut self, file: &'static str, rays: Rays) -> Self {
+        (self.file, self.compiled_for) = (file, rays);
+        self
     }
 
     /// Pass and mode.
@@ -388,7 +427,7 @@ impl StreamShaders {
 
     /// The shader for a tracer and step; `None` where [`Variant::applies_to`] says so.
     pub fn variant(&self, variant: Variant) -> Option<Shader> {
-        let source = Source::Stream { pass: self.pass, mode: self.mode, variant };
+        let source = Source::Stream { pass: self.file, mode: self.mode, rays: self.compiled_for, variant };
         variant.applies_to(self.rays).then_some(Shader::new(source))
     }
 

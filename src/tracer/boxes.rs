@@ -17,6 +17,18 @@ pub(super) fn reach_padding(reach: f32) -> f32 {
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
+/// World-space bounds of the scene, padded as the boxes of hierarchies are.
+pub(super) fn scene_bounds(flat: &FlatScene) -> Aabb {
+    let b = flat.bounds();
+    if b == Aabb::EMPTY {
+        return b;
+    }
+    let reach = b.min.abs().max(b.max.abs()).max_element().max(0.0);
+    let moved = if flat.is_single_level() { 0.0 } else { instance_padding(reach) };
+    let pad = reach_padding(reach) + moved;
+    Aabb { min: b.min - pad, max: b.max + pad }
+}
+
 pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGroup) -> impl Iterator<Item = Aabb> {
     group.submeshes.iter().flat_map(move |part| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();

@@ -3,8 +3,10 @@
 
 use std::sync::Arc;
 
+use super::boxes::scene_bounds;
 use super::hierarchy::{Hierarchy, record, unfinished_counter};
 use super::kernel::Kernel;
+use super::stream::LaunchMemory;
 use super::upload::write_records;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
@@ -44,10 +46,10 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         root: flat.instances.len() as u32,
         instance_roots: flat.instances.iter().map(|p| ranges[p.group][0]).collect(),
         stack_entries: 0,
-        bounds: flat.bounds(),
+        bounds: scene_bounds(flat),
         unfinished: unfinished_counter(device)?,
         few: None,
-        launch: None,
+        launch: LaunchMemory::new(device, None)?,
         dynamic: None,
         areas: None,
     })

@@ -313,10 +313,10 @@ impl GpuScene {
         self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
-        self.root.launch_hits = h.launch.as_ref().map_or(0, |l| l.hits.address());
-        self.root.launch_counters = h.launch.as_ref().map_or(0, |l| l.counters.address());
+        self.root.launch_hits = h.launch.hits.address();
+        self.root.launch_counters = h.launch.counters.address();
         self.root.areas = h.areas.as_ref().map_or(0, |a| a.root.address());
-        self.root.suspended = h.launch.as_ref().and_then(|l| l.suspended.as_ref()).map_or(0, |s| s.memory.address());
+        self.root.suspended = h.launch.suspended.as_ref().map_or(0, |s| s.memory.address());
         write_all(&mut self.root_buffer, &[self.root])
     }
 

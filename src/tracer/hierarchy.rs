@@ -34,8 +34,8 @@ pub(super) struct Hierarchy {
     /// The leaves of a static scene without instances that has few, and their number, for passes
     /// that trace rays among other work.
     pub few: Option<(Buffer, u32)>,
-    /// Buffers between the steps of a launch (fast kernel only).
-    pub launch: Option<LaunchMemory>,
+    /// Buffers between the steps of a launch.
+    pub launch: LaunchMemory,
     /// State to update it in a dynamic scene (fast kernel only).
     pub dynamic: Option<Box<DynamicTrees>>,
     /// Influence areas that have trees of their own (binary kernels only).
@@ -58,11 +58,6 @@ impl Hierarchy {
                 "the driver ended the traversal of {n} {what} early (Mesa before 23 leaves a loop after 65,535 iterations): use {remedy}"
             ))),
         }
-    }
-
-    /// Buffers between the steps of a launch of the fast kernel.
-    pub fn launch_memory(&self) -> Result<LaunchMemory> {
-        self.launch.clone().ok_or_else(|| Error::Vulkan(format!("kernel '{}' has no steps", self.kernel)))
     }
 
     /// Value of the specialization constant for the stack's array. The fast kernels hold the top of

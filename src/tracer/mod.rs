@@ -59,7 +59,7 @@ use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::interface::constants;
-use crate::shaders::{self, ComputeShader, Mode, StreamShaders};
+use crate::shaders::{self, ComputeShader, Mode, Rays, StreamShaders};
 use crate::stage;
 use gpu_scene::GpuScene;
 use hierarchy::Hierarchy;
@@ -352,30 +352,26 @@ impl Tracer {
     }
 
     fn compile(&self, shaders: &'static StreamShaders, constants: &Specialization) -> Result<Stream> {
+        let constants = &match shaders.rays {
+            Rays::Queue => constants.clone().set(constants::RAYS_ARE_QUEUED, true),
+            _ => constants.clone(),
+        };
         let scene = || stream::scene_specialization(self.features).and(constants);
         match &self.structure {
             Structure::Compute(h) => {
                 let (info, options) =
                     (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
                 let s = precompiled::specialization(info, self.features, options, h.stack_constant());
+                let s = if h.areas.is_some() { s.set(constants::HAS_AREAS, true) } else { s };
                 let all = s.clone().and(constants);
-                let (rays_per_lane, _) = lane_budget(info);
-                match h.kernel {
-                    Kernel::Nearest | Kernel::Direction => {
-                        let all = all.set(constants::HAS_AREAS, h.areas.is_some());
-                        Stream::reference(&self.device, shaders, &all, rays_per_lane)
-                    }
-                    Kernel::Brute => Stream::brute(&self.device, shaders, &all),
-                    Kernel::Auto | Kernel::Wide | Kernel::Packet => {
-                        if precompiled::in_packets(info, h.kernel, shaders) {
-                            let spec = precompiled::large(info, h.kernel, shaders, &all);
-                            return Ok(Stream::packets(self.prepared.take(&self.device, &spec)?, shaders));
-                        }
-                        // it does not depend on the pass, so streams share it
-                        let kernel = self.kernel(shaders.mode, &precompiled::large(info, h.kernel, shaders, &s))?;
-                        Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch_memory()?)
-                    }
+                if precompiled::in_packets(info, h.kernel, shaders) {
+                    let spec = precompiled::large(info, h.kernel, shaders, &all);
+                    return Ok(Stream::packets(self.prepared.take(&self.device, &spec)?, shaders));
                 }
+                // it does not depend on the pass, so streams share it
+                let kernel = self.kernel(shaders.mode, &precompiled::large(info, h.kernel, shaders, &s))?;
+                let rays_per_lane = if h.kernel == Kernel::Brute { 1 } else { lane_budget(info).0 };
+                Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch.clone())
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => {
                 Stream::query(&self.device, shaders, &scene())
@@ -426,7 +422,7 @@ impl Tracer {
         Ok(self.entry_pass.get_or_init(|| pass).clone())
     }
 
-    /// The fast kernel, compiled once for all streams of a mode.
+    /// The kernel that traces rays in memory, compiled once for all streams of a mode.
     fn kernel(&self, mode: Mode, spec: &PipelineSpec) -> Result<Arc<ComputePipeline>> {
         let slot = &self.kernels[mode as usize];
         if let Some(kernel) = slot.get() {

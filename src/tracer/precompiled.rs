@@ -10,7 +10,7 @@ use crate::accel::features::SceneFeatures;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::interface::constants;
-use crate::shaders::{Shader, StreamShaders, Variant, wide_kernel};
+use crate::shaders::{Shader, StreamShaders, Traversal, Variant, kernel};
 
 /// Minimum number of primitives for compiling ahead: the BVH of a smaller scene is built sooner
 /// than a pipeline is compiled.
@@ -109,17 +109,20 @@ pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShad
     shaders.variant(Variant::Packet).is_some() && wanted && kernel.for_coherent(info) == Kernel::Packet
 }
 
-/// The pipeline of the fast kernels that traces the stream.
+/// The pipeline of the compute tracer that traces the stream.
 pub(super) fn large(
     info: &DeviceInfo,
-    kernel: Kernel,
+    chosen: Kernel,
     shaders: &'static StreamShaders,
     s: &Specialization,
 ) -> PipelineSpec {
-    let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
-    let (name, shader) = match packet {
-        Some(shader) => (shaders.name(), shader),
-        None => ("wide kernel", wide_kernel(shaders.mode, stream::has_ballots(info))),
+    let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, chosen, shaders));
+    let own = |traversal| kernel(traversal, shaders.mode, stream::has_ballots(info));
+    let (name, shader) = match (packet, chosen) {
+        (Some(shader), _) => (shaders.name(), shader),
+        (None, Kernel::Auto | Kernel::Wide | Kernel::Packet) => ("wide kernel", own(Traversal::Wide)),
+        (None, Kernel::Nearest | Kernel::Direction) => ("binary kernel", own(Traversal::Binary)),
+        (None, Kernel::Brute) => ("brute kernel", own(Traversal::Brute)),
     };
     PipelineSpec { name, shader, specialization: s.clone(), packets: packet.is_some() }
 }

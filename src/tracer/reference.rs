@@ -3,10 +3,11 @@
 
 use std::sync::Arc;
 
-use super::boxes::{instance_boxes, padding, primitive_boxes};
+use super::boxes::{instance_boxes, padding, primitive_boxes, scene_bounds};
 use super::hierarchy::{Hierarchy, record, unfinished_counter};
 use super::kernel::{BuildOptions, Kernel};
 use super::local_trees::LocalTrees;
+use super::stream::LaunchMemory;
 use super::upload::write_records;
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::FlatScene;
@@ -21,8 +22,6 @@ pub(super) struct Trees {
     top: Option<Bvh2>,
     /// Trees of influence areas.
     local: Option<LocalTrees>,
-    /// World-space bounds of the scene, not padded.
-    bounds: Aabb,
 }
 
 impl Trees {
@@ -36,13 +35,13 @@ impl Trees {
         }
         let mut top = None;
         if !flat.is_single_level() {
-            bounds = instance_boxes(flat, &bounds);
+            let boxes = instance_boxes(flat, &bounds);
             // a leaf of the top level holds one instance, because traversal continues in the
             // instance's own BVH
-            top = Some(Bvh2::from_tree(options.builder(flat, bounds.len()).tree(&bounds, 1)));
+            top = Some(Bvh2::from_tree(options.builder(flat, boxes.len()).tree(&boxes, 1)));
         }
         let local = options.local.as_ref().map(|o| LocalTrees::build(flat, o, MAX_LEAF)).transpose()?.flatten();
-        Ok(Self { groups, top, local, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) })
+        Ok(Self { groups, top, local })
     }
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
@@ -92,10 +91,10 @@ impl Trees {
             root,
             instance_roots: flat.instances.iter().map(|p| roots[p.group]).collect(),
             stack_entries,
-            bounds: self.bounds,
+            bounds: scene_bounds(flat),
             unfinished: unfinished_counter(device)?,
             few: None,
-            launch: None,
+            launch: LaunchMemory::new(device, None)?,
             dynamic: None,
             areas,
         })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    Buffer, ComputePipeline, Device, DeviceInfo, HitShaders, RayTracingPipeline, Recorder, Specialization,
+    Buffer, ComputePipeline, Device, DeviceInfo, HitShaders, Memory, RayTracingPipeline, Recorder, Specialization,
 };
 use crate::interface::constants;
 use crate::interface::records::hierarchy::{LaunchHit, RESUMED, UNFINISHED};
@@ -39,10 +39,7 @@ pub fn with_uncovered(rays: u32) -> u32 {
 #[derive(Clone)]
 enum Pipeline {
     /// One compute shader over all rays.
-    Single {
-        pipeline: Arc<ComputePipeline>,
-        rays_per_group: u32,
-    },
+    Single(Arc<ComputePipeline>),
     /// The compute tracer's packet kernel: one shader over all rays.
     Packets(Arc<ComputePipeline>),
     /// Generate, trace, deliver.
@@ -74,6 +71,21 @@ pub(super) struct LaunchMemory {
     pub counters: Arc<Buffer>,
     /// Where drivers end loops before some ray may be done.
     pub suspended: Option<SuspendedRays>,
+}
+
+impl LaunchMemory {
+    /// Memory for the largest launch of a device.
+    pub fn new(device: &Arc<Device>, suspended: Option<SuspendedRays>) -> Result<Self> {
+        let capacity = with_uncovered(launch_rays(&device.info));
+        let buffer = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
+        Ok(Self {
+            capacity,
+            rays: buffer("launch rays", size_of::<Ray>() as u64)?,
+            hits: buffer("launch hits", size_of::<LaunchHit>() as u64)?,
+            counters: buffer("launch counters", 4)?,
+            suspended,
+        })
+    }
 }
 
 /// Rays whose traversal is not done when the driver ends a loop (shaders/trace/suspend.glsl).
@@ -121,6 +133,11 @@ pub(super) fn has_ballots(info: &DeviceInfo) -> bool {
     info.int64 && info.limits.subgroup_ballot
 }
 
+/// The variants of a device that generate rays into memory, and deliver hits.
+fn step_variants(info: &DeviceInfo) -> [Variant; 2] {
+    if has_ballots(info) { [Variant::Generate64, Variant::Deliver64] } else { [Variant::Generate, Variant::Deliver] }
+}
+
 /// Compiles one of a stream's shaders.
 fn compile(
     device: &Arc<Device>,
@@ -140,7 +157,7 @@ impl Stream {
         self.shaders
     }
 
-    /// A stream for the compute tracer's fast kernel, which streams share.
+    /// A stream for a kernel of the compute tracer, which streams share: `trace`.
     pub(super) fn steps(
         device: &Arc<Device>,
         shaders: &'static StreamShaders,
@@ -149,15 +166,11 @@ impl Stream {
         rays_per_lane: u32,
         memory: LaunchMemory,
     ) -> Result<Self> {
-        let (generate, deliver) = if has_ballots(&device.info) {
-            (Variant::Generate64, Variant::Deliver64)
-        } else {
-            (Variant::Generate, Variant::Deliver)
-        };
+        let [generate, deliver] = step_variants(&device.info);
         let pipeline = Pipeline::Steps {
             generate: match shaders.rays {
                 Rays::Queue => None,
-                Rays::Generated | Rays::Camera | Rays::CameraOrKnown => Some(compile(device, shaders, generate, s)?),
+                _ => Some(compile(device, shaders, generate, s)?),
             },
             trace,
             deliver: compile(device, shaders, deliver, s)?,
@@ -183,26 +196,8 @@ impl Stream {
         matches!(self.pipeline, Pipeline::Packets(_))
     }
 
-    /// A stream for the compute tracer's binary BVH.
-    pub(super) fn reference(
-        device: &Arc<Device>,
-        shaders: &'static StreamShaders,
-        s: &Specialization,
-        rays_per_lane: u32,
-    ) -> Result<Self> {
-        let pipeline = compile(device, shaders, Variant::Bvh2, s)?;
-        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
-    }
-
-    /// A stream for the compute tracer without a BVH.
-    pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = compile(device, shaders, Variant::Brute, s)?;
-        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
-    }
-
     pub(super) fn query(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = compile(device, shaders, Variant::Query, s)?;
-        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
+        Ok(Self { pipeline: Pipeline::Single(compile(device, shaders, Variant::Query, s)?), shaders })
     }
 
     pub(super) fn pipeline(
@@ -233,7 +228,7 @@ impl Stream {
     ) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!(
-                "the rays of '{}' are not camera rays: they cannot be rasterized",
+                "the rays of '{}' are not camera rays that can be rasterized",
                 shaders.name()
             )));
         }
@@ -243,8 +238,10 @@ impl Stream {
 
     /// A stream whose hits another pass has found: the shader knows where they are.
     pub(super) fn known(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let variant = if has_ballots(&device.info) { Variant::Known64 } else { Variant::Known };
-        Ok(Self { pipeline: Pipeline::Known(compile(device, shaders, variant, s)?), shaders })
+        debug_assert!(shaders.rays == Rays::CameraOrKnown, "'{}' finds no hits", shaders.name());
+        let [_, deliver] = step_variants(&device.info);
+        let s = s.clone().set(constants::HITS_ARE_KNOWN, true);
+        Ok(Self { pipeline: Pipeline::Known(compile(device, shaders, deliver, &s)?), shaders })
     }
 
     /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names
@@ -260,11 +257,6 @@ impl Stream {
         // a kernel does all, or steps hand rays and hits on in memory
         let pass = self.shaders.pass;
         match &self.pipeline {
-            Pipeline::Single { pipeline, rays_per_group } => {
-                let run = if *rays_per_group == LANES { RUN } else { 1 };
-                recorder
-                    .timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(*rays_per_group), run)));
-            }
             Pipeline::Packets(pipeline) => {
                 let groups = spread(push.count.div_ceil(LANES * PACKET_RAYS), 1);
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, groups));
@@ -321,7 +313,7 @@ impl Stream {
                         .timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
             }
-            Pipeline::Known(pipeline) => {
+            Pipeline::Single(pipeline) | Pipeline::Known(pipeline) => {
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(LANES), RUN)));
             }
             Pipeline::Rasterized(pipeline) => {

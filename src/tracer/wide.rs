@@ -14,7 +14,7 @@ use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::hierarchy::{Hierarchy, unfinished_counter};
 use super::kernel::{BuildOptions, Kernel};
 use super::lane_budget::{resumptions, stack_constant};
-use super::stream::{LaunchMemory, SuspendedRays, launch_rays, with_uncovered};
+use super::stream::{LaunchMemory, SuspendedRays};
 use super::upload::write_records;
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::{Entries, KeyBuilder};
@@ -26,10 +26,9 @@ use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{
-    ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, STACK_IN_REGISTERS, SUSPENDED_RAYS, SUSPENDED_START,
-    SUSPENDED_WORDS, SphereLeaf, TriangleLeaf,
+    ALPHA_TESTED, InstanceLeaf, SPHERE, STACK_IN_REGISTERS, SUSPENDED_RAYS, SUSPENDED_START, SUSPENDED_WORDS,
+    SphereLeaf, TriangleLeaf,
 };
-use crate::ray::Ray;
 use crate::scene::Geometry;
 use crate::stage;
 
@@ -144,9 +143,10 @@ impl Trees {
             Ok::<_, Error>((buffer, few.leaves.len() as u32))
         });
 
-        // memory of a launch
-        let capacity = with_uncovered(launch_rays(&device.info));
-        let launch = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
+        let suspended = match resumptions(&device.info, visits) {
+            0 => None,
+            n => Some(SuspendedRays { memory: suspended_rays(device, stack_entries)?, resumptions: n }),
+        };
         Ok(Hierarchy {
             kernel,
             primitives: None,
@@ -159,16 +159,7 @@ impl Trees {
             areas: None,
             nodes,
             few: few.transpose()?,
-            launch: Some(LaunchMemory {
-                capacity,
-                rays: launch("launch rays", size_of::<Ray>() as u64)?,
-                hits: launch("launch hits", size_of::<LaunchHit>() as u64)?,
-                counters: launch("launch counters", 4)?,
-                suspended: match resumptions(&device.info, visits) {
-                    0 => None,
-                    n => Some(SuspendedRays { memory: suspended_rays(device, stack_entries)?, resumptions: n }),
-                },
-            }),
+            launch: LaunchMemory::new(device, suspended)?,
         })
     }
 }

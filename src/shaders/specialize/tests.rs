@@ -9,11 +9,11 @@ use crate::shaders;
 /// Shaders of every kind: large and small, with loops, switches, calls, and of every stage.
 fn shaders() -> Vec<shaders::Shader> {
     use shaders::*;
-    let streams = [&AO_TRACE_ANY, &PATH_BOUNCE_CLOSEST, &PATH_CAMERA_CLOSEST, &RAYS_ANY, &RAYS_CLOSEST];
+    let streams = [&AO_TRACE_ANY, &PATH_SHADOW_WALLS_CLOSEST, &PATH_CAMERA_CLOSEST, &RAYS_ANY, &RAYS_CLOSEST];
     let of_streams = streams.into_iter().flat_map(|s| s.variants());
     let compute = [&ANTIALIAS, &FILTER, &GTAO, &PATH_RESOLVE, &TEMPORAL, &RADIANCE_TEMPORAL].map(|c| c.variant(true));
     let stages = [MISS, TRIANGLE_CLOSEST, TRIANGLE_ANY, SPHERE_INTERSECTION, DRAW_TRIANGLES, DRAW_ALPHA, DRAW_SPHERE];
-    let kernels = [wide_kernel(Mode::Any, true), wide_kernel(Mode::Closest, false)];
+    let kernels = [kernel(Traversal::Wide, Mode::Any, true), kernel(Traversal::Wide, Mode::Closest, false)];
     of_streams.chain(compute).chain(stages).chain(kernels).collect()
 }
 
@@ -147,7 +147,7 @@ fn features_that_are_off_are_gone() {
 
 #[test]
 fn a_constant_that_is_not_set_has_its_default() {
-    let shader = shaders::wide_kernel(shaders::Mode::Any, true);
+    let shader = shaders::kernel(shaders::Traversal::Wide, shaders::Mode::Any, true);
     let spirv = shader.spirv().unwrap();
     let default = specialize(&spirv, &[], false).unwrap();
     let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)], false).unwrap();
