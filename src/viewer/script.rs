@@ -393,7 +393,8 @@ impl Script {
         (elapsed, most): (Duration, Duration),
     ) -> Result<bool, String> {
         let holds = match condition {
-            Condition::Picture => app.panes[0].progress.is_some(),
+            // of the scene that was opened last
+            Condition::Picture => app.panes[0].progress.is_some() && app.control.is_some() && !app.can_cancel_loading(),
             Condition::Settled => app.is_settled(),
             Condition::Samples(count) => app.shown_samples() >= *count || app.is_settled(),
             Condition::Compared => app.comparison.is_some(),
