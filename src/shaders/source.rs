@@ -232,7 +232,7 @@ pub enum Source {
     },
     /// A kernel of the compute tracer.
     Kernel {
-        /// What it traverses.
+        /// The hierarchy that it traverses, if any.
         traversal: Traversal,
         /// The answer to each ray.
         mode: Mode,
@@ -401,8 +401,8 @@ impl StreamShaders {
         Self { pass, mode, rays, file: pass, compiled_for: rays, labels: OnceLock::new() }
     }
 
-    /// The same of `shaders/FILE.glsl`, which another stream has, too: rays of which one has them in
-    /// a queue, and the other generates them (`RAYS_ARE_QUEUED`). `rays`: those that are generated.
+    /// The same of `shaders/FILE.glsl`, which another stream has, too. One of both has its rays in
+    /// a queue (`RAYS_ARE_QUEUED`); the other has those that the file generates, `rays`.
     pub const fn sharing(mut self, file: &'static str, rays: Rays) -> Self {
         (self.file, self.compiled_for) = (file, rays);
         self
