@@ -67,7 +67,7 @@ def visit(rng: random.Random, techniques: Deck, tracers: Deck, folder: Path, num
         ["key X", "wait 1", "drag-control Line between the images -60 0 0.3", "wait 0.5", "key X"],
         ["key T", "wait 5", "key Space", "wait 0.5", "key Space", "key T"],
         [f"resize {rng.randint(500, 1300)} {rng.randint(420, 900)}", "wait 0.5", "resize 1000 700"],
-        ["key Ctrl+S", "wait text:Save the image", "key Ctrl+A", f"type {path()}", "key Enter", "wait text:saved"],
+        ["wait picture 120", "key Ctrl+S", "wait text:Save the image", "key Ctrl+A", f"type {path()}", "key Enter", "wait text:saved"],
         ["key ?", "wait 0.3", "key Escape", "key N", "wait 0.3", "key N"],
         *(["click Show", f"click {techniques.next()}", "wait 1.5"] for _ in range(shown)),
         ["key X", "click Comparison", "click Second image", f"click {techniques.next()}", "wait 2", "click Comparison", "key X"],

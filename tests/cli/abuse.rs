@@ -550,9 +550,9 @@ fn gpu_what_was_interrupted_goes_on() {
     // a still that keeps what it has, and is resumed: the same bits as in one go
     let [a, b] = ["a.exr", "b.exr"].map(|name| place(&dir, name));
     let base = ["render", "builtin:stairs", "--size", "320x200", "--quiet", "--spp"];
-    let child = skylit(&[&base[..], &["100000", "--resumable", "--keep-partial", "-o", &a]].concat());
+    let child = skylit(&[&base[..], &["100000", "--intervals", "--keep-partial", "-o", &a]].concat());
     let mut child = { child }.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
+    until("no intermediate image", || names(dir.path()).iter().any(|n| n.as_bytes().starts_with(b"a.0")));
     signal(&child, "INT");
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let image = skylit::output::load(a.as_ref()).unwrap();
