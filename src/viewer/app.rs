@@ -369,7 +369,7 @@ impl App {
             self.start_animation(&animations);
             if self.settings.camera.chooses() {
                 // as at the start: by what the settings say
-                (self.control, self.followed, self.sent.camera) = (None, None, None);
+                (self.control, self.followed) = (None, None);
             }
         }
         Ok(())
@@ -684,7 +684,6 @@ impl App {
             self.panes = Default::default();
             self.bookmarks.clear();
             self.turntable = 0.0;
-            self.sent.camera = None;
             self.frames.clear();
             self.start_animation(&summary.animations);
         }

@@ -106,6 +106,21 @@ expect-no-errors",
     .unwrap();
 }
 
+/// A scene that is opened after another one is seen by a camera of its own, also where nothing else
+/// that is requested differs: the camera of the first one was moved, and neither has an AO radius.
+#[test]
+fn gpu_another_scene_has_a_camera_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "wait picture 300
+drag 200 200 260 220 0.3 left
+wait 0.5
+drop builtin:cornell-spheres
+wait 1
+wait picture 60
+expect-no-errors";
+    run(Some("builtin:plane"), folder.path(), text).unwrap();
+}
+
 /// A file whose light is candela and lux: the first path of it shows something, and says by which exposure; ambient occlusion has none.
 #[test]
 fn gpu_light_of_a_file_is_exposed() {
