@@ -33,6 +33,7 @@ void main() {
     Ray ray = no_ray();
     vec4 radiance = vec4(0.0);
     uint rays = 0u;
+    uint start = INVALID;  // the flat leaf that its ray starts on
     // of all of its paths
     uint bounce_rays = 0u, shadow_rays = 0u, longest = 0u;
 
@@ -51,12 +52,15 @@ void main() {
                 state = camera_state(p, path, index, ray.direction);
                 radiance = vec4(0.0);
                 rays = 0u;
+                start = INVALID;
             }
         }
 
         Ray traced = ray;
         if (!has_path) traced = no_ray();
-        Hit hit = few_closest(few, few_count, traced);
+        Hit hit = few_closest(few, few_count, traced, start);
+        // within a volume that scatters a ray may start anywhere
+        start = !HAS_SCATTERING && (path.few_flat >> hit_slot & 1u) != 0u ? hit_slot : INVALID;
         clear_left_rays();
         if (has_path) {
             if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, state.index), path_sample(state.index), state.depth + state.passes + 1u);
@@ -73,7 +77,7 @@ void main() {
                 if (i == 0u) to_light = light_rays[0];
                 else to_light = light_rays[1];
             }
-            bool occluded = few_any(few, few_count, to_light);
+            bool occluded = few_any(few, few_count, to_light, start);
             if (has_ray) shadow_rays++;
             if (has_ray && !occluded) radiance += vec4(i == 0u ? light_contributions[0] : light_contributions[1], WITH_CATCHER && i == 0u ? light_coverage : 0.0);
         }

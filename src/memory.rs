@@ -79,7 +79,7 @@ impl Budget {
     /// # Errors
     /// Why they are not to be had, as the end of a sentence. [`Budget::check`] says the same, also
     /// where this error has become a warning.
-    pub fn take(&self, bytes: u64, what: impl FnOnce() -> String) -> Result<(), String> {
+    pub fn take(&self, bytes: u64, what: impl Fn() -> String) -> Result<(), String> {
         self.take_for_now(bytes, 0, what)
     }
 
@@ -87,7 +87,11 @@ impl Budget {
     ///
     /// # Errors
     /// Those of [`Budget::take`].
-    pub fn take_for_now(&self, bytes: u64, besides: u64, what: impl FnOnce() -> String) -> Result<(), String> {
+    pub fn take_for_now(&self, bytes: u64, besides: u64, what: impl Fn() -> String) -> Result<(), String> {
+        self.take_named(bytes, besides, &what)
+    }
+
+    fn take_named(&self, bytes: u64, besides: u64, what: &dyn Fn() -> String) -> Result<(), String> {
         let mut account = self.account.lock().unwrap_or_else(PoisonError::into_inner);
         if account.refused.is_some() {
             return Err("is left out: the memory that this load may take is used up".to_owned());

@@ -44,6 +44,12 @@ vec2 map_interval(EnvironmentRecord map, uint at) {
 
 uint map_columns(EnvironmentRecord map, uint row) { return map.height + 2u + row * (map.width + 1u); }
 
+// Cells of the guide to so many intervals (src/sampling/bilinear.rs).
+uint guide_cells(uint intervals) { return (intervals + GUIDED_INTERVALS - 1u) / GUIDED_INTERVALS; }
+
+// Where the guide to a row's columns begins, after that to rows.
+uint guide_columns(EnvironmentRecord map, uint row) { return guide_cells(map.height + 1u) + 1u + row * (guide_cells(map.width) + 1u); }
+
 // Density per solid angle of a direction in a patch whose row and column have these intervals.
 float map_density(EnvironmentRecord map, Patch q, uint row, vec2 rows, vec2 columns, float sin_theta) {
     float mean = 0.25 * (q.a.w + q.b.w + q.c.w + q.d.w);
@@ -85,10 +91,13 @@ struct MapSample {
     float pdf;
 };
 
-// The interval among `count` that holds u, which begin at the table's place `first`; what is left of u is as even as it was.
-uint find_interval(EnvironmentRecord map, uint first, uint count, inout float u, out vec2 interval) {
+// The interval among `count` that holds u, which begin at the table's place `first`, and their guide at `first_cell`; what is left of u is as even as it was.
+uint find_interval(EnvironmentRecord map, uint first, uint count, uint first_cell, inout float u, out vec2 interval) {
     Floats table = Floats(map.table);
-    uint low = 0u;
+    uint cells = guide_cells(count);
+    uint cell = first_cell + min(uint(to_int(floor(u * float(cells)))), cells - 1u);
+    uint low = Words(map.guide).v[cell];
+    count = Words(map.guide).v[cell + 1u] - low + 1u;
     while (count > 1u) {
         uint half_ = count >> 1;
         if (table.v[first + low + half_] <= u) low += half_;
@@ -111,8 +120,8 @@ float sample_linear(float u, float a, float b) {
 
 MapSample sample_map(EnvironmentRecord map, vec2 u) {
     vec2 rows, columns;
-    uint row = find_interval(map, 0u, map.height + 1u, u.y, rows);
-    uint column = find_interval(map, map_columns(map, row), map.width, u.x, columns);
+    uint row = find_interval(map, 0u, map.height + 1u, 0u, u.y, rows);
+    uint column = find_interval(map, map_columns(map, row), map.width, guide_columns(map, row), u.x, columns);
     Patch q = map_patch(map, ivec2(column, row), vec2(0.0));
     float y = sample_linear(u.y, q.a.w + q.b.w, q.c.w + q.d.w);
     q.at = vec2(sample_linear(u.x, mix(q.a.w, q.c.w, y), mix(q.b.w, q.d.w, y)), y);

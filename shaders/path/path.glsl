@@ -272,7 +272,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     else m = shade(s, towards_viewer, log_side);
     // of views and of ambient light, in one place: drivers compile a copy of the look-up for each
     vec3 albedo = vec3(0.0);
-    if (WITH_VIEW || WITH_AMBIENT && state.depth == 0u) albedo = surface_albedo(s, log_side);
+    if (WITH_VIEW ? p.view == VIEW_ALBEDO : WITH_AMBIENT && state.depth == 0u) albedo = surface_albedo(s, log_side);
     if (WITH_VIEW) return view_value(p.view, s, m, hit.t + clipped_length(block, ray.direction), log_side, albedo);
     vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {

@@ -11,7 +11,8 @@
 // `few`: leaves, then their boxes of eight floats; `few_count`: their number, a multiple of two, of which the last box may be empty.
 const uint FEW_SLOT = 31u;
 
-// The boxes of all leaves against the lane's ray: bits of those that it meets, and distances to the two nearest, with the leaf's number in the five lowest bits.
+// The boxes of all leaves against the lane's ray: bits of those that it meets, but for the flat one that it starts on, and distances to the two nearest, with the leaf's number in
+// the five lowest bits.
 #define MEET_BOX(k)                                                                                                     \
     {                                                                                                                   \
         vec3 lower = vec3(subgroupBroadcast(own, (k)), subgroupBroadcast(own, (k) + 1), subgroupBroadcast(own, (k) + 2));         \
@@ -20,7 +21,7 @@ const uint FEW_SLOT = 31u;
         vec3 n = MIN(t0, t1), f = MAX(t0, t1);                                                                          \
         float near = MAX(MAX(n.x, n.y), MAX(n.z, world.tmin));                                                          \
         float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, world.tmax);                                              \
-        bool met = near <= far;                                                                                         \
+        bool met = near <= far && slot != start;                                                                        \
         uint key = met ? (floatBitsToUint(near) & ~FEW_SLOT) | slot : INVALID;                                          \
         hits |= met ? 1u << slot : 0u;                                                                                  \
         second = min(second, max(first, key));                                                                          \
@@ -50,7 +51,7 @@ const uint FEW_SLOT = 31u;
     Shear shear = make_shear(direction, inverse);                       \
     const uint mine = ~0u;                                              \
     float best = world.tmax;                                            \
-    uint best_instance = 0u, best_primitive = INVALID;                  \
+    uint best_instance = 0u, best_primitive = INVALID, best_slot = 0u;  \
     vec2 best_uv = vec2(0.0);
 
 // Words of a leaf, and the instance that it belongs to; all are in the world's space.
@@ -64,6 +65,7 @@ const uint FEW_SLOT = 31u;
     best = t;                         \
     best_uv = uv;                     \
     best_instance = instance;         \
+    best_slot = slot;                 \
     best_primitive = (id) & NUMBER;
 #define ACCEPT_TRIANGLE(id, turn, p0, p1, p2)                                   \
     ACCEPT(id)                                                                  \
@@ -72,8 +74,11 @@ const uint FEW_SLOT = 31u;
     hit_corners.p[1] = pick_corner(p0, p1, p2, second_);                        \
     hit_corners.p[2] = pick_corner(p0, p1, p2, third_);
 
-// The closest hit of a ray, with scene ids; sets hit_corners.
-Hit few_closest(uvec2 few, uint few_count, Ray world) {
+// The leaf of the closest hit.
+uint hit_slot;
+
+// The closest hit of a ray, with scene ids; sets hit_corners and hit_slot. start: the flat leaf that the ray starts on, which it cannot meet, or INVALID.
+Hit few_closest(uvec2 few, uint few_count, Ray world, uint start) {
     DECLARE_FEW
     MEET_BOXES
     while (hits != 0u) {
@@ -90,6 +95,7 @@ Hit few_closest(uvec2 few, uint few_count, Ray world) {
     }
     Hit hit = miss();
     if (best_primitive != INVALID) hit = scene_hit(best, best_instance, best_primitive, best_uv);
+    hit_slot = best_slot;
     return hit;
 }
 
@@ -98,8 +104,8 @@ Hit few_closest(uvec2 few, uint few_count, Ray world) {
 #define ACCEPT(id) best_primitive = (id) & NUMBER;
 #define ACCEPT_TRIANGLE(id, turn, p0, p1, p2) ACCEPT(id)
 
-// Whether something is in the way of a ray.
-bool few_any(uvec2 few, uint few_count, Ray world) {
+// Whether something is in the way of a ray. start: as above.
+bool few_any(uvec2 few, uint few_count, Ray world, uint start) {
     DECLARE_FEW
     MEET_BOXES
     while (hits != 0u) {

@@ -157,6 +157,11 @@ impl Buffer {
             write(0, &mut bytes[..size as usize]);
             return Ok(());
         }
+        self.fill_staged(size, record, &mut write)
+    }
+
+    /// [`Buffer::fill`] through a staging buffer.
+    fn fill_staged(&mut self, size: u64, record: u64, write: &mut dyn FnMut(u64, &mut [u8])) -> Result<()> {
         let piece = (STAGING / record).max(1) * record;
         let mut staging = Buffer::new(&self.device, "staging", piece.min(size), Memory::Upload)?;
         let mut commands = Commands::new(&self.device)?;
@@ -219,6 +224,11 @@ impl Buffer {
             take(0, &bytes[offset as usize..(offset + size) as usize]);
             return Ok(());
         }
+        self.read_staged(offset, size, record, &mut take)
+    }
+
+    /// [`Buffer::read_with`] through a staging buffer.
+    fn read_staged(&self, offset: u64, size: u64, record: u64, take: &mut dyn FnMut(u64, &[u8])) -> Result<()> {
         let piece = (STAGING / record).max(1) * record;
         let staging = Buffer::new(&self.device, "read-back staging", piece.min(size), Memory::Readback)?;
         let mut commands = Commands::new(&self.device)?;

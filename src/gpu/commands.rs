@@ -67,16 +67,7 @@ impl Commands {
     /// Records with `record`, submits, waits until the device is done, and returns the timed
     /// regions in order. Writes of the work are visible to the host and to later submissions.
     pub fn run(&mut self, record: impl FnOnce(&mut Recorder)) -> Result<Vec<Timing>> {
-        let raw = &self.device.raw;
-        // SAFETY (all calls below): the buffer is not in use, because every submission was waited
-        // for; recording and submission follow the specification's order; the queue is locked
-        unsafe {
-            if let Some(queries) = self.queries.filter(|_| self.written > 0) {
-                raw.reset_query_pool(queries, 0, self.written);
-            }
-            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
-        }
+        self.begin()?;
         let mut recorder = Recorder {
             device: &self.device,
             buffer: self.buffer,
@@ -87,7 +78,27 @@ impl Commands {
         record(&mut recorder);
         recorder.final_barrier();
         let labels = recorder.labels;
+        self.submit(&labels)
+    }
+
+    /// Begins recording.
+    fn begin(&self) -> Result<()> {
+        let raw = &self.device.raw;
+        // SAFETY: the buffer and its queries are not in use, because every submission was waited for
+        unsafe {
+            if let Some(queries) = self.queries.filter(|_| self.written > 0) {
+                raw.reset_query_pool(queries, 0, self.written);
+            }
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            raw.begin_command_buffer(self.buffer, &begin).context("recording commands")
+        }
+    }
+
+    /// Submits what was recorded, and waits for it.
+    fn submit(&mut self, labels: &[&'static str]) -> Result<Vec<Timing>> {
         self.written = 2 * labels.len() as u32;
+        let raw = &self.device.raw;
+        // SAFETY: recording and submission follow the specification's order; the queue is locked
         unsafe {
             raw.end_command_buffer(self.buffer).context("recording commands")?;
             let buffers = [self.buffer];
@@ -99,7 +110,7 @@ impl Commands {
             raw.wait_for_fences(&[self.fence], true, u64::MAX).context("waiting for the device")?;
             raw.reset_fences(&[self.fence]).context("waiting for the device")?;
         }
-        self.timings(&labels)
+        self.timings(labels)
     }
 
     fn timings(&self, labels: &[&'static str]) -> Result<Vec<Timing>> {

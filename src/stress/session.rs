@@ -177,7 +177,19 @@ impl<'a> StressSession<'a> {
         if self.observer.should_stop()? {
             return Err(Error::Interrupted);
         }
-        let checks = match measure(&self.setup, &mut Watch::new(self.observer)) {
+        let measured = measure(&self.setup, &mut Watch::new(self.observer));
+        self.keep(name, tracer, start, measured)
+    }
+
+    /// Keeps the checks that are wanted of those measured since `start`.
+    fn keep(
+        &mut self,
+        name: &str,
+        tracer: Option<TracerKind>,
+        start: Instant,
+        measured: Result<Vec<Check>>,
+    ) -> Result<()> {
+        let checks = match measured {
             Ok(checks) => checks,
             // nothing else can be measured either
             Err(e @ (Error::Interrupted | Error::DeviceLost(_))) => return Err(e),

@@ -16,6 +16,17 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{ALPHA_TESTED, SPHERE, SphereRecord, TriangleRecord};
 
+/// The leaves of a scene that has few ([`crate::accel::few`]).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FewAddresses {
+    /// Device address of the leaves, then of their boxes.
+    pub leaves: u64,
+    /// Their number.
+    pub count: u32,
+    /// A bit for each: it is flat.
+    pub flat: u32,
+}
+
 /// Hierarchies in device memory.
 pub(super) struct Hierarchy {
     pub kernel: Kernel,
@@ -31,9 +42,9 @@ pub(super) struct Hierarchy {
     pub bounds: Aabb,
     /// A u32: number of rays whose traversal the driver ended early.
     pub unfinished: Buffer,
-    /// The leaves of a static scene without instances that has few, and their number, for passes
-    /// that trace rays among other work.
-    pub few: Option<(Buffer, u32)>,
+    /// The leaves of a static scene without instances that has few, for passes that trace rays
+    /// among other work, and where they are.
+    pub few: Option<(Buffer, FewAddresses)>,
     /// Buffers between the steps of a launch.
     pub launch: LaunchMemory,
     /// State to update it in a dynamic scene (fast kernel only).

@@ -1,6 +1,7 @@
 //! Passes that trace their rays themselves, among other work, with the compute tracer's functions
 //! (`shaders/trace/few.glsl`): each lane has a ray, and waits until those of the others are done.
 
+use super::hierarchy::FewAddresses;
 use super::lane_budget::lane_budget;
 use super::stream::spread;
 use super::{ComputeOptions, Kernel, Push, Structure, Tracer, precompiled};
@@ -36,11 +37,11 @@ impl Tracer {
         has_lanes && is_chosen && !info.cuts_long_loops()
     }
 
-    /// Device address of the leaves of a static scene without instances that has few, and their
-    /// number ([`crate::accel::few`]); `None` for other scenes and tracers.
-    pub fn few_leaves(&self) -> Option<(u64, u32)> {
+    /// The leaves of a static scene without instances that has few; `None` for other scenes and
+    /// tracers.
+    pub fn few_leaves(&self) -> Option<FewAddresses> {
         match &self.structure {
-            Structure::Compute(h) => h.few.as_ref().map(|(buffer, count)| (buffer.address(), *count)),
+            Structure::Compute(h) => h.few.as_ref().map(|(_, few)| *few),
             Structure::Hardware { .. } => None,
         }
     }

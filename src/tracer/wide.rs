@@ -9,9 +9,9 @@ use glam::{DAffine3, Vec3};
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::boxes::{instance_boxes, padding, primitive_boxes};
+use super::boxes::{instance_boxes, padding, primitive_boxes, reach_padding};
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
-use super::hierarchy::{Hierarchy, unfinished_counter};
+use super::hierarchy::{FewAddresses, Hierarchy, unfinished_counter};
 use super::kernel::{BuildOptions, Kernel};
 use super::lane_budget::{resumptions, stack_constant};
 use super::stream::{LaunchMemory, SuspendedRays};
@@ -134,13 +134,15 @@ impl Trees {
         };
 
         // the leaves, where there are few, nothing moves, and all are in the world's space
+        let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
         let is_baked = |i: &TlasInstance| i.scene_instance.is_none() && i.to_world == DAffine3::IDENTITY && !i.hidden;
         let few = (dynamic.is_none() && flat.instances.iter().all(is_baked))
-            .then(|| FewLeaves::collect(flat.instances.iter().map(|i| &self.groups[i.group])))
+            .then(|| FewLeaves::collect(flat.instances.iter().map(|i| &self.groups[i.group]), reach_padding(reach)))
             .flatten();
         let few = few.map(|few| {
             let buffer = Buffer::from_slice(device, "few leaves", &few.bytes())?;
-            Ok::<_, Error>((buffer, few.leaves.len() as u32))
+            let (leaves, count) = (buffer.address(), few.leaves.len() as u32);
+            Ok::<_, Error>((buffer, FewAddresses { leaves, count, flat: few.flat }))
         });
 
         let suspended = match resumptions(&device.info, visits) {

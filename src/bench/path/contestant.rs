@@ -1,7 +1,7 @@
 //! Contestants, and what was measured of them until now.
 
 use super::curve::{ErrorCurve, ErrorPoint};
-use super::engine::{Engine, PathReference};
+use super::engine::{Engine, MAX_SPP, PathReference, STEP};
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::measure::displayed::without_reference;
 use crate::measure::metrics::{ImagePair, bad_pixels};
@@ -29,10 +29,38 @@ pub struct SampleCount {
     rays: Option<u64>,
 }
 
+impl SampleCount {
+    /// Error over all images, that of the reference included.
+    fn rmse(&self) -> f64 {
+        (self.squares.iter().sum::<f64>() / self.squares.len() as f64).sqrt()
+    }
+}
+
 impl<'a> Contestant<'a> {
     /// One of which nothing was measured yet.
     pub fn new(name: String, reference: usize, engine: Engine<'a>) -> Self {
         Self { name, reference, engine, by_spp: Vec::new(), biases: Vec::new(), longest_launch: None }
+    }
+
+    /// The sample count to warm up with next: two in any case, then while images take less than half
+    /// of `seconds`, and once more where that should get to the error `target`.
+    pub fn next_count(&self, seconds: f64, target: Option<f64>) -> Option<u32> {
+        let Some(last) = self.by_spp.last() else { return Some(1) };
+        let is_short = last.spp == 1 || 2.0 * last.seconds[0] < seconds;
+        let goes_on = is_short || last.seconds[0] < seconds && target.is_some_and(|rmse| self.would_reach(rmse));
+        last.spp.checked_mul(STEP).filter(|spp| goes_on && *spp <= MAX_SPP)
+    }
+
+    /// Does one more sample count get to an error, if it falls as between the last two?
+    fn would_reach(&self, rmse: f64) -> bool {
+        let [.., before, last] = self.by_spp.as_slice() else { return false };
+        let (before, last) = (before.rmse(), last.rmse());
+        last > rmse && last * last / before <= rmse
+    }
+
+    /// Error of the longest images, that of the reference included.
+    pub fn last_rmse(&self) -> Option<f64> {
+        self.by_spp.last().map(SampleCount::rmse)
     }
 
     /// Renders an image and measures it, also in the warming round, whose seeds are its own.
@@ -110,5 +138,38 @@ impl<'a> Contestant<'a> {
             longest_launch: self.longest_launch,
             points,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn next(counts: &[(f64, f64)], target: f64) -> Option<u32> {
+        let engine = Engine::Peer { peer: 0, kernel: String::new(), size: [1, 1] };
+        let mut contestant = Contestant::new("a".into(), 0, engine);
+        for (k, (seconds, rmse)) in counts.iter().enumerate() {
+            let (seconds, squares) = (vec![*seconds], vec![rmse * rmse]);
+            contestant.by_spp.push(SampleCount {
+                spp: STEP.pow(k as u32),
+                seconds,
+                squares,
+                bad: Vec::new(),
+                rays: None,
+            });
+        }
+        contestant.next_count(4.0, Some(target))
+    }
+
+    #[test]
+    fn images_get_longer_until_the_target() {
+        assert_eq!(
+            [next(&[], 0.1), next(&[(9.0, 1.0)], 0.1), next(&[(0.1, 1.0), (0.4, 0.5)], 0.1)],
+            [1, 4, 16].map(Some)
+        );
+        // at the limit: only where one more gets there
+        let curve = [(0.2, 1.0), (0.8, 0.4), (3.0, 0.16)];
+        assert_eq!([next(&curve, 0.2), next(&curve, 0.07), next(&curve, 0.06)], [None, Some(64), None]);
+        assert_eq!(next(&[(1.5, 1.0), (6.0, 0.4)], 0.2), None);
     }
 }

@@ -17,6 +17,8 @@ const REFERENCE_SEED: u32 = 0x7e0_0000;
 const CHUNK_SECONDS: f64 = 2.0;
 /// Sample counts go up by this: powers of four are what stratifying samplers do best with.
 pub const STEP: u32 = 4;
+/// Paths of a pixel in one image at most.
+pub const MAX_SPP: u32 = 1 << 16;
 /// Images of a reference at least: two for each half.
 const MIN_CHUNKS: u32 = 4;
 

@@ -8,11 +8,13 @@ mod engine;
 mod peer;
 mod scenes;
 
+use std::collections::BTreeSet;
+
 pub use args::BenchPathArgs;
 use args::PathSession;
 use contestant::Contestant;
 use curve::{ErrorCurve, PART};
-use engine::{Engine, PathReference, STEP, render_reference};
+use engine::{Engine, MAX_SPP, PathReference, render_reference};
 use scenes::PathScene;
 
 use super::peers::file::{self, Measures, PeerSpec};
@@ -31,8 +33,6 @@ use crate::terminal::console::Failure;
 use crate::terminal::interrupt;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer};
 
-/// Paths of a pixel in one image at most.
-const MAX_SPP: u32 = 1 << 16;
 /// Share of a scene's progress that its references get.
 const REFERENCES: f64 = 0.4;
 
@@ -104,7 +104,7 @@ impl PathSession<'_> {
             }
             contestants.extend(theirs);
         }
-        self.rounds(&name, &mut contestants, &references)?;
+        self.rounds(&name, &mut contestants, baseline.as_deref(), &references)?;
         let curves: Vec<ErrorCurve> = contestants.into_iter().map(|c| c.finish(size, &references)).collect();
 
         // all at once: what is interrupted on the way is no result
@@ -179,41 +179,43 @@ impl PathSession<'_> {
         render_reference(engine, name, peers, (limit, MAX_SPP), &mut advance)
     }
 
-    /// Runs contestants in turn for each sample count: a warming round, then timed ones.
-    fn rounds(&mut self, scene: &str, contestants: &mut [Contestant], references: &[PathReference]) -> Result<()> {
-        let rounds = self.args.repeats() + 1;
-        for round in 0..rounds {
-            self.phase(match round {
-                0 => format!("{scene}: warming up"),
-                _ => format!("{scene}: round {round} of {}", rounds - 1),
-            });
-            let (mut spp, mut going) = (1u32, true);
-            while going && spp <= MAX_SPP {
-                going = false;
-                for contestant in contestants.iter_mut() {
-                    let wanted = match round {
-                        // those whose last image was short go on; a curve has two points
-                        0 => contestant.by_spp.last().is_none_or(|l| {
-                            l.spp * STEP == spp && (l.spp == 1 || 2.0 * l.seconds[0] < self.args.seconds())
-                        }),
-                        _ => contestant.by_spp.iter().any(|l| l.spp == spp),
-                    };
-                    if !wanted {
-                        continue;
-                    }
-                    going = true;
+    /// Runs contestants in turn for each sample count: a warming round, in which each finds out how
+    /// far it goes, the baseline first, then timed ones.
+    fn rounds(
+        &mut self,
+        scene: &str,
+        contestants: &mut [Contestant],
+        baseline: Option<&str>,
+        references: &[PathReference],
+    ) -> Result<()> {
+        // warming up: compiling is not what is timed
+        let mut target = None;
+        for is_baseline in [true, false] {
+            for contestant in contestants.iter_mut().filter(|c| (baseline == Some(c.name.as_str())) == is_baseline) {
+                self.phase(format!("{scene}: warming up {}", contestant.name));
+                while let Some(spp) = contestant.next_count(self.args.seconds(), target) {
+                    contestant
+                        .render(&mut self.peers, 0, spp, references)
+                        .map_err(|e| e.into_error(&contestant.name))?;
+                }
+                target = target.or_else(|| contestant.last_rmse().filter(|_| is_baseline));
+            }
+        }
+        contestants.iter_mut().flat_map(|c| &mut c.by_spp).for_each(|l| l.seconds.clear());
+
+        let rounds = self.args.repeats();
+        let counts = contestants.iter().flat_map(|c| &c.by_spp).map(|l| l.spp).collect::<BTreeSet<u32>>();
+        for round in 1..=rounds {
+            self.phase(format!("{scene}: round {round} of {rounds}"));
+            self.advance(REFERENCES + (1.0 - REFERENCES) * f64::from(round) / f64::from(rounds + 1));
+            for &spp in &counts {
+                for contestant in contestants.iter_mut().filter(|c| c.by_spp.iter().any(|l| l.spp == spp)) {
                     contestant
                         .render(&mut self.peers, round, spp, references)
                         .map_err(|e| e.into_error(&contestant.name))?;
                 }
-                spp *= STEP;
             }
-            if round == 0 {
-                // compiling is not what is timed
-                contestants.iter_mut().flat_map(|c| &mut c.by_spp).for_each(|l| l.seconds.clear());
-            }
-            self.advance(REFERENCES + (1.0 - REFERENCES) * f64::from(round + 1) / f64::from(rounds));
-            if self.is_late() && round > 0 {
+            if self.is_late() {
                 self.stop_early();
                 break;
             }

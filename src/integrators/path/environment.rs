@@ -42,6 +42,7 @@ impl DeviceEnvironment {
             out.iter_mut().zip(&map.radiance[y * width..][..width]).for_each(|(w, c)| *w = weight(c));
         });
         let table = Buffer::from_slice(device, "environment distribution", &distribution.table)?;
+        let guide = Buffer::from_slice(device, "environment guide", &distribution.guide)?;
         drop(distribution);
         let bytes = size_of::<[f32; 4]>() as u64;
         let mut texels = Buffer::new(device, "environment", bytes * map.radiance.len() as u64, Memory::Device)?;
@@ -54,6 +55,8 @@ impl DeviceEnvironment {
         let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
+            guide: guide.address(),
+            reserved: [0; 2],
             blurred: blurred.as_ref().map_or(0, Buffer::address),
             width: map.width,
             height: map.height,
@@ -63,7 +66,7 @@ impl DeviceEnvironment {
             map: record,
             factor: map.factor,
             mean: totals.mean_radiance * map.factor,
-            _buffers: [texels, table].into_iter().chain(blurred).collect(),
+            _buffers: [texels, table, guide].into_iter().chain(blurred).collect(),
         })
     }
 }

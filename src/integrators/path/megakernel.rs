@@ -52,7 +52,7 @@ impl Schedule {
             _ if !tracer.can_trace_in_passes() => Self::CannotTrace,
             _ if queued.into_iter().any(|f| features.contains(f)) => Self::NeedsQueues,
             None => Self::Large,
-            Some((_, leaves)) => Self::Megakernel(leaves),
+            Some(few) => Self::Megakernel(few.count),
         };
         match schedule {
             Self::Megakernel(_) => Ok(schedule),

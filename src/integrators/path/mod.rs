@@ -335,7 +335,7 @@ impl PathEstimator {
         let (mut features, light_kinds) = sources.features(flat, options, cones);
         features.insert_if(has_signal, PathFeature::Signal);
         let schedule = Schedule::choose(options.kernel, tracer, features)?;
-        let (few, few_count) = tracer.few_leaves().unwrap_or_default();
+        let few = tracer.few_leaves().unwrap_or_default();
         let stores_sky_pdfs = sources.needs_sky_pdfs(features, light_kinds);
         let LightSources { environment, lights, builder } = sources;
         let lights = DeviceLights::new(device, lights)?;
@@ -347,8 +347,9 @@ impl PathEstimator {
         let counts = Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?;
         let base = PathParams {
             counts: counts.address(),
-            few,
-            few_count,
+            few: few.leaves,
+            few_count: few.count,
+            few_flat: few.flat,
             max_rays: max_rays_of_path(features, options.bounces()),
             map: environment.map,
             environment: environment.factor.to_array(),

@@ -21,6 +21,8 @@ records! {
         SIGNAL_PENDING: float = -2.0;
         /// Width of a blurred environment map, texels.
         BLURRED_WIDTH: uint = 192;
+        /// Intervals of an environment's sampling table for each cell of its guide, on average.
+        GUIDED_INTERVALS: uint = 4;
         /// Height of a blurred environment map, texels.
         BLURRED_HEIGHT: uint = 96;
     };
@@ -31,6 +33,10 @@ records! {
         texels: address,
         /// Floats: the sampling table (path/map.glsl).
         table: address,
+        /// Uints: where a search in the table begins and ends (`GUIDED_INTERVALS`).
+        guide: address,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uvec2,
         /// Width in texels.
         width: uint,
         /// Height in texels.
@@ -150,8 +156,8 @@ records! {
         few: address,
         /// The material of a ground that catches shadows, with `WITH_CATCHER`.
         catcher: uint,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint,
+        /// A bit for each of those leaves: it is flat.
+        few_flat: uint,
     }
 
     /// Parameters of the paths of a frame in real time, with `WITH_SIGNAL`. They lie behind the
