@@ -154,7 +154,7 @@ mod tests {
         let [tight, wide] = [1e-3, 1e6].map(|pad| FewLeaves::collect([&tree], pad).expect("few"));
         for ((leaf, tight), wide) in tight.leaves.iter().zip(&tight.boxes).zip(&wide.boxes) {
             let item = bytemuck::cast_ref::<Block, TriangleLeaf>(leaf).primitives[0] as usize;
-            assert!((0..3).all(|k| tight[k] < boxes[item].min[k] && tight[k + 3] > boxes[item].max[k]));
+            assert!((0..3).all(|k| tight[k] <= boxes[item].min[k] && tight[k + 3] >= boxes[item].max[k]));
             assert!((0..3).all(|k| wide[k] <= tight[k] && wide[k + 3] >= tight[k + 3] && wide[k + 3] < 1e3));
         }
     }
