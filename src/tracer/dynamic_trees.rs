@@ -14,8 +14,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::{padding, reach_padding};
+use super::device_builder::DeviceBuilder;
 use super::transform::{instance_padding, transformed_bounds, world_to_group};
-use super::wide::{Trees, Triangles, tree, triangle_tree_of};
+use super::wide::{TreeBuilder, Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
@@ -164,10 +165,11 @@ impl DynamicTrees {
     }
 
     /// Refits the tree of a deformed group, or rebuilds it when the policy decides so. Returns
-    /// whether it was rebuilt, and its SAH cost relative to that at the last build.
+    /// whether it was rebuilt, and its SAH cost relative to that at the last build. `builder`: builds
+    /// it on the device, where it can.
     pub fn deform(
         &mut self,
-        device: &Arc<Device>,
+        (device, builder): (&Arc<Device>, Option<&DeviceBuilder>),
         nodes: &mut Buffer,
         group: usize,
         positions: &[Vec3],
@@ -178,8 +180,8 @@ impl DynamicTrees {
         let start = Instant::now();
         if self.groups[group].should_rebuild() {
             let triangles = Triangles { positions: positions.to_vec(), indices: deforming.indices.clone() };
-            let built =
-                triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default, Some(self.groups[group].depth));
+            let builder = TreeBuilder::new(BuildPreset::Default, builder);
+            let built = triangle_tree_of(&triangles, deforming.opaque, builder, Some(self.groups[group].depth));
             let seconds = start.elapsed().as_secs_f64();
             if built.blocks.len() > self.groups[group].capacity {
                 self.grow(device, nodes, group, spare_capacity(built.blocks.len()))?;
@@ -218,7 +220,7 @@ impl DynamicTrees {
         };
         let rebuild = instances.len() <= MAX_TOP_REBUILD || top.should_rebuild();
         if rebuild {
-            let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
+            let built = tree(boxes, BuildPreset::Fast.into(), Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
         } else {
             let pad = padding(boxes.iter());
