@@ -46,7 +46,8 @@ Cuts cuts_of(BuildParams p, uint id, BuildNode node) {
         node.choices |= pays ? choice << 3u * (c - 1u) : 0u;                     \
     }
 
-void join(BuildParams p, uint a, uint b, uint id) {
+// Makes a node of two, and returns its height.
+uint join(BuildParams p, uint a, uint b, uint id) {
     BuildNodes nodes = BuildNodes(p.nodes);
     BuildNode of_left = nodes.v[a], of_right = nodes.v[b], node;
     Cuts left = cuts_of(p, a, of_left), right = cuts_of(p, b, of_right);
@@ -67,9 +68,14 @@ void join(BuildParams p, uint a, uint b, uint id) {
     CUT(6u)
     CUT(7u)
     node.blocks = inner.blocks[0];
+    uint height = max(of_left.choices >> HEIGHT_SHIFT, of_right.choices >> HEIGHT_SHIFT) + 1u;
+    node.choices |= height << HEIGHT_SHIFT;
     nodes.v[id] = node;
     BuildInners(p.inners).v[id - p.count] = inner;
+    return height;
 }
+
+shared uint height;
 
 void main() {
     BuildParams p = BuildParams(push.pass);
@@ -80,6 +86,7 @@ void main() {
     uint own = tile * CLUSTER_TILE + lane;
     uvec2 cluster = lane < CLUSTER_TILE && own < count ? from.v[own] : uvec2(ABSORBED, 0u);
     bool is_kept = cluster.x != ABSORBED, merges = is_kept && cluster.x != ALONE;
+    if (lane == 0u) height = 0u;
     // both counts in one sum
     uint total, before = scan_lanes((is_kept ? 1u : 0u) | (merges ? 0x10000u : 0u), total);
     if (is_kept) {
@@ -88,8 +95,10 @@ void main() {
         if (merges) {
             // each merger before has made one cluster less, and a node
             id = 2u * p.count - count + counts.v[tiles + tile] - counts.v[tiles] + (before >> 16);
-            join(p, cluster.y, from.v[cluster.x].y, id);
+            atomicMax(height, join(p, cluster.y, from.v[cluster.x].y, id));
         }
         to.v[counts.v[tile] + (before & 0xffffu)] = uvec2(0u, id);
     }
+    barrier();
+    if (lane == 0u) atomicMax(BuildState(p.state).height, height);
 }

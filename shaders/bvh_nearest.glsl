@@ -33,8 +33,10 @@ void main() {
     barrier();
 
     uint own = first + SEARCH_RADIUS + lane, best = INVALID;
-    // neighbours in order, where as many rounds are left as that takes
-    bool in_order = round_ + (count <= 1u ? 0u : uint(findMSB(count - 1u)) + 1u) >= p.max_rounds;
+    // neighbours in order, where as many rounds or levels are left as that takes
+    uint levels = count <= 1u ? 0u : uint(findMSB(count - 1u)) + 1u;
+    BuildState state = BuildState(p.state);
+    bool in_order = round_ + levels >= MAX_ROUNDS || state.height + levels >= state.max_height;
     if (own < count && in_order) {
         best = (own ^ 1u) < count ? own ^ 1u : INVALID;
     } else if (own < count) {

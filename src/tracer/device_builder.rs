@@ -17,12 +17,12 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Timing};
 use crate::interface::records::builder::{
     BUILD_LANES, BUILD_STEPS, BuildInner, BuildNode, BuildParams, BuildState, BuildStep, CLUSTER_TILE, FIRST_LEVEL,
-    FIRST_ROUND, MAX_GROUPS_X, MAX_ROUNDS, SORT_DIGITS, SORT_KEYS, SORT_PASSES,
+    FIRST_ROUND, MAX_GROUPS_X, MAX_ROUNDS, MAX_TREE_LEVELS, SORT_DIGITS, SORT_KEYS, SORT_PASSES,
 };
 use crate::interface::records::ray::Push;
 use crate::shaders;
 
-const _: () = assert!(MAX_ROUNDS == MAX_DEPTH);
+const _: () = assert!(MAX_TREE_LEVELS == MAX_DEPTH);
 
 /// Keys of a work-group of the sort.
 const SORT_TILE: u32 = BUILD_LANES * SORT_KEYS;
@@ -60,6 +60,13 @@ pub struct DeviceBuilder {
     emit: ComputePipeline,
     work: Mutex<Work>,
     min_leaves: usize,
+}
+
+/// What the device says of a tree.
+struct BuildResult {
+    state: BuildState,
+    /// Levels of wide nodes; one more than can be for a tree that is too deep.
+    depth: u32,
 }
 
 /// What one build after the other uses.
@@ -130,12 +137,7 @@ impl DeviceBuilder {
         if boxes.len() < self.min_leaves {
             return None;
         }
-        // bounding the binary tree bounds the wide one, at a loss of quality
-        let built = self.build(boxes, MAX_DEPTH, leaf);
-        let built = match (built, max_depth) {
-            (Ok(tree), Some(max)) if tree.depth > max => self.build(boxes, max, leaf),
-            (built, _) => built,
-        };
+        let built = self.build(boxes, max_depth.unwrap_or(MAX_DEPTH), leaf);
         if built.is_err() {
             self.work.lock().unwrap_or_else(PoisonError::into_inner).stats.refused += 1;
         }
@@ -144,7 +146,7 @@ impl DeviceBuilder {
 
     /// Builds a hierarchy over boxes, which are padded, and not empty or NaN. `leaf` returns the
     /// block of one; no path has more nodes than `max_depth`, at least the binary logarithm of the
-    /// number of boxes.
+    /// number of boxes and at most [`MAX_DEPTH`].
     ///
     /// # Errors
     /// [`Error::Scene`] for more boxes or larger coordinates than a device takes, and those of the
@@ -173,29 +175,48 @@ impl DeviceBuilder {
             None => memory.insert(BuildMemory::new(&self.device, boxes.len())?),
         };
         let count = boxes.len() as u32;
-        let max_rounds = max_depth.clamp(count.next_power_of_two().ilog2(), MAX_ROUNDS);
-        memory.write(boxes, max_rounds, 0.5 / reach, leaf)?;
-        let timings = commands.run(|r| self.record(r, memory, count, max_rounds))?;
+        memory.write(boxes, 0.5 / reach, leaf)?;
+        let mut result = self.run(commands, memory, count, MAX_ROUNDS, stats)?;
+        if result.depth > max_depth {
+            // no wide tree is deeper than the binary one, which is of lower quality where it is bounded
+            result = self.run(commands, memory, count, max_depth.max(count.next_power_of_two().ilog2()), stats)?;
+        }
+        stats.trees += 1;
+        stats.leaves += u64::from(count);
 
-        // what the host needs to know, and the blocks
-        let bytes =
-            memory.read_back.bytes().ok_or_else(|| Error::Vulkan("the read-back buffer is not mapped".into()))?;
-        let (state, steps) = bytes.split_at(STATE_BYTES as usize);
-        let state: BuildState = bytemuck::pod_read_unaligned(state);
-        let steps: Vec<BuildStep> = bytemuck::pod_collect_to_vec(&steps[..BUILD_STEPS as usize * STEP_BYTES as usize]);
-        let busy = |first: u32| steps[first as usize..][..MAX_ROUNDS as usize].iter().take_while(|s| s.groups[0] > 0);
-        stats.add(count, busy(FIRST_ROUND).count() as u32, &timings);
+        // the blocks, and what the host needs to know besides
+        let BuildResult { state, depth } = result;
         let mut blocks = vec![Block::default(); state.blocks as usize];
         memory.blocks.read_with(0, BLOCK_BYTES * u64::from(state.blocks), BLOCK_BYTES, |first, bytes| {
             let part: &mut [u8] = bytemuck::cast_slice_mut(&mut blocks[first as usize..]);
             part[..bytes.len()].copy_from_slice(bytes);
         })?;
         let sah_cost = if state.root_area > 0.0 { f64::from(state.root_cost / state.root_area) } else { 0.0 };
-        Ok(WideBvh { blocks, depth: busy(FIRST_LEVEL).count() as u32, bounds: Some(bounds), sah_cost })
+        Ok(WideBvh { blocks, depth, bounds: Some(bounds), sah_cost })
+    }
+
+    /// Runs all passes for a binary tree of at most `max_height` inner nodes on a path.
+    fn run(
+        &self,
+        commands: &mut Commands,
+        memory: &mut BuildMemory,
+        count: u32,
+        max_height: u32,
+        stats: &mut DeviceBuildStats,
+    ) -> Result<BuildResult> {
+        memory.start(count, max_height)?;
+        let timings = commands.run(|r| self.record(r, memory, count))?;
+        let bytes =
+            memory.read_back.bytes().ok_or_else(|| Error::Vulkan("the read-back buffer is not mapped".into()))?;
+        let (state, steps) = bytes.split_at(STATE_BYTES as usize);
+        let steps: Vec<BuildStep> = bytemuck::pod_collect_to_vec(&steps[..(BUILD_STEPS as u64 * STEP_BYTES) as usize]);
+        let busy = |first: u32| steps[first as usize..].iter().take_while(|s| s.groups[0] > 0).count() as u32;
+        stats.add(busy(FIRST_ROUND), &timings);
+        Ok(BuildResult { state: bytemuck::pod_read_unaligned(state), depth: busy(FIRST_LEVEL) })
     }
 
     /// Records all passes. Rounds and levels that are not needed have no work-groups.
-    fn record(&self, r: &mut Recorder, memory: &BuildMemory, count: u32, max_rounds: u32) {
+    fn record(&self, r: &mut Recorder, memory: &BuildMemory, count: u32) {
         let push = |first: u32| Push { pass: memory.params.address(), first, ..Default::default() };
         let direct = |r: &mut Recorder, pass: &ComputePipeline, first: u32, size: u32| {
             r.dispatch_3d(pass, &push(first), tile_groups(count.div_ceil(size)));
@@ -213,12 +234,12 @@ impl DeviceBuilder {
             }
         });
         r.timed(CLUSTERING, |r| {
-            for round in 0..max_rounds {
+            for round in 0..MAX_ROUNDS {
                 self.cluster.iter().for_each(|half| indirect(r, half, round, FIRST_ROUND + round));
             }
         });
         r.timed(EMITTING, |r| {
-            (0..max_rounds.max(1)).for_each(|level| indirect(r, &self.emit, level, FIRST_LEVEL + level));
+            (0..MAX_TREE_LEVELS).for_each(|level| indirect(r, &self.emit, level, FIRST_LEVEL + level));
         });
         r.copy(&memory.state, 0, &memory.read_back, 0, memory.state.size());
     }
@@ -229,10 +250,8 @@ const CLUSTERING: &str = "clustering";
 const EMITTING: &str = "making wide nodes";
 
 impl DeviceBuildStats {
-    fn add(&mut self, leaves: u32, rounds: u32, timings: &[Timing]) {
+    fn add(&mut self, rounds: u32, timings: &[Timing]) {
         let seconds = |label| timings.iter().filter(|t| t.label == label).map(|t| t.seconds).sum::<f64>();
-        self.trees += 1;
-        self.leaves += u64::from(leaves);
         self.sort_seconds += seconds(SORTING);
         self.cluster_seconds += seconds(CLUSTERING);
         self.emit_seconds += seconds(EMITTING);
@@ -279,8 +298,8 @@ impl BuildMemory {
         })
     }
 
-    /// Writes leaves, parameters, and the state before the first pass.
-    fn write(&mut self, boxes: &[Aabb], max_rounds: u32, scale: f32, leaf: impl Fn(u32) -> Block + Sync) -> Result<()> {
+    /// Writes leaves and parameters.
+    fn write(&mut self, boxes: &[Aabb], scale: f32, leaf: impl Fn(u32) -> Block + Sync) -> Result<()> {
         let count = boxes.len() as u32;
         let node = |i: u32| {
             let b = &boxes[i as usize];
@@ -298,14 +317,15 @@ impl BuildMemory {
             leaves: self.leaves.address(),
             blocks: self.blocks.address(),
             count,
-            max_rounds,
             scale,
-            ..Default::default()
         };
-        self.params.write(0, bytemuck::bytes_of(&params))?;
+        self.params.write(0, bytemuck::bytes_of(&params))
+    }
 
-        // all clusters in the first round, and the root in the first level
-        let state = BuildState { low: [u32::MAX; 3], ..Default::default() };
+    /// Writes the state before the first pass: all clusters are in the first round, and the root is
+    /// in the first level.
+    fn start(&mut self, count: u32, max_height: u32) -> Result<()> {
+        let state = BuildState { low: [u32::MAX; 3], max_height, ..Default::default() };
         let mut steps = [BuildStep { groups: [0, 1, 1], ..Default::default() }; BUILD_STEPS as usize];
         steps[FIRST_LEVEL as usize].groups[0] = 1;
         if count > 1 {

@@ -15,14 +15,18 @@ records! {
         SEARCH_RADIUS: uint = 16;
         /// Clusters of a work-group: the other invocations repeat the search of its neighbours.
         CLUSTER_TILE: uint = 96;
-        /// Maximum number of rounds of clustering, and of levels of the wide tree: `MAX_DEPTH`.
-        MAX_ROUNDS: uint = 48;
+        /// Maximum number of rounds of clustering, and of inner nodes on a path of the binary tree.
+        MAX_ROUNDS: uint = 112;
+        /// Maximum number of levels of the wide tree: `MAX_DEPTH`.
+        MAX_TREE_LEVELS: uint = 48;
+        /// First bit of the height of a binary node in `BuildNode.choices`.
+        HEIGHT_SHIFT: uint = 24;
         /// The step of the first round: there is one more than are recorded.
         FIRST_ROUND: uint = SORT_PASSES;
         /// The step of the first level: there is one more than are recorded.
         FIRST_LEVEL: uint = FIRST_ROUND + MAX_ROUNDS + 1;
         /// Number of steps.
-        BUILD_STEPS: uint = FIRST_LEVEL + MAX_ROUNDS + 1;
+        BUILD_STEPS: uint = FIRST_LEVEL + MAX_TREE_LEVELS + 1;
         /// Work-groups along x; more go along y, for which each device has 65,535.
         MAX_GROUPS_X: uint = 32768;
     };
@@ -34,7 +38,8 @@ records! {
         min: vec3,
         /// Three bits for each number c of wide subtrees, 1 to 7, from the lowest: how many of them
         /// the left child takes where c are least expensive; 0: c - 1 are. For c = 1: how many of
-        /// the seven children of a wide node. Zero for a leaf.
+        /// the seven children of a wide node. Above them the height: inner nodes on the longest path.
+        /// Zero for a leaf.
         choices: uint,
         /// Upper corner.
         max: vec3,
@@ -77,8 +82,12 @@ records! {
         root_cost: float,
         /// Number of blocks.
         blocks: uint,
+        /// The greatest height of a cluster.
+        height: uint,
+        /// The greatest height that there may be, at least the binary logarithm of the number of leaves.
+        max_height: uint,
         /// Padding to a multiple of 16 bytes.
-        reserved: uint[3],
+        reserved: uint,
     }
 
     /// Parameters of the passes of a build.
@@ -102,12 +111,8 @@ records! {
         blocks: address,
         /// Number of leaves.
         count: uint,
-        /// Maximum number of rounds, at least the binary logarithm of `count`.
-        max_rounds: uint,
         /// Half of the reciprocal of the largest coordinate: areas of boxes are neither too large
         /// nor too small for a float.
         scale: float,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint[3],
     }
 }
