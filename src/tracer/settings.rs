@@ -147,8 +147,8 @@ settings! {
         triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL), research;
         /// BVH build of the compute tracer [default: auto]
         ///
-        /// It is a quality, or for --traversal nearest and direction a rule for rays that are
-        /// known.
+        /// It is a quality, or the device, or for --traversal nearest and direction a rule for rays that
+        /// are known.
         build: Option<BuildMethod>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Direction of the rays that --build sah-spfh and pah... are for
         build_direction: Option<DVec3>,
