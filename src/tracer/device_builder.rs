@@ -31,7 +31,7 @@ const SORT_TILE: u32 = BUILD_LANES * SORT_KEYS;
 /// neither infinite nor zero.
 const MAX_REACH: f32 = 1e30;
 
-/// What has been built on a device.
+/// Counts and times of the hierarchies that a device has built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct DeviceBuildStats {
     /// Number of hierarchies.
@@ -62,14 +62,14 @@ pub struct DeviceBuilder {
     min_leaves: usize,
 }
 
-/// What the device says of a tree.
+/// The device's account of a tree.
 struct BuildResult {
     state: BuildState,
     /// Levels of wide nodes; one more than can be for a tree that is too deep.
     depth: u32,
 }
 
-/// What one build after the other uses.
+/// Memory and commands of one build after the other.
 struct Work {
     commands: Commands,
     memory: Option<BuildMemory>,
@@ -121,7 +121,7 @@ impl DeviceBuilder {
         })
     }
 
-    /// What has been built so far.
+    /// Counts and times so far.
     pub fn stats(&self) -> DeviceBuildStats {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).stats
     }
@@ -178,7 +178,7 @@ impl DeviceBuilder {
         memory.write(boxes, 0.5 / reach, leaf)?;
         let mut result = self.run(commands, memory, count, MAX_ROUNDS, stats)?;
         if result.depth > max_depth {
-            // no wide tree is deeper than the binary one, which is of lower quality where it is bounded
+            // no wide tree is deeper than the binary one, whose quality suffers from the bound
             result = self.run(commands, memory, count, max_depth.max(count.next_power_of_two().ilog2()), stats)?;
         }
         stats.trees += 1;
@@ -258,7 +258,7 @@ impl DeviceBuildStats {
         self.rounds = rounds;
     }
 
-    /// What has been built, in words; `None` where nothing was to be.
+    /// The counts in words; `None` where nothing was to be built.
     pub fn text(&self) -> Option<String> {
         let milliseconds = 1e3 * self.seconds();
         let refused = match self.refused {

@@ -99,8 +99,8 @@ pub struct BuildOptions {
     pub heuristic: Option<Heuristic>,
     /// Trees of influence areas besides that of the scene, for the binary kernels only.
     pub local: Option<LocalOptions>,
-    /// Build the trees of the wide kernels over at least so many leaves on the device; `None` builds
-    /// all of them on the host.
+    /// Build the trees of the wide kernels over at least so many leaves on the device; `None`
+    /// builds all of them on the host.
     pub on_device: Option<usize>,
     /// Approximate number of rays that will be traced.
     pub rays: u64,

@@ -97,7 +97,7 @@ pub struct BuildStats {
     /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for
     /// scenes of several trees.
     pub sah_cost: Option<f64>,
-    /// What of the BVHs the device has built.
+    /// BVHs that the device has built.
     pub on_device: DeviceBuildStats,
 }
 

@@ -83,7 +83,7 @@ pub struct BuildCost {
     pub bytes_per_primitive: f64,
     /// Cost of the hierarchy by the surface area heuristic, where it is known.
     pub sah_cost: Option<f64>,
-    /// What of it the device has built.
+    /// Builds of the device, if any.
     pub on_device: DeviceBuildStats,
 }
 

@@ -38,8 +38,8 @@ records! {
         min: vec3,
         /// Three bits for each number c of wide subtrees, 1 to 7, from the lowest: how many of them
         /// the left child takes where c are least expensive; 0: c - 1 are. For c = 1: how many of
-        /// the seven children of a wide node. Above them the height: inner nodes on the longest path.
-        /// Zero for a leaf.
+        /// the seven children of a wide node. Above them the height: inner nodes on the longest
+        /// path. Zero for a leaf.
         choices: uint,
         /// Upper corner.
         max: vec3,
@@ -47,8 +47,8 @@ records! {
         blocks: uint,
     }
 
-    /// What else an inner node of the binary tree has: its children, and what it costs as at most
-    /// 1 to 7 wide subtrees.
+    /// The other part of an inner node of the binary tree: its children, and what it costs as at
+    /// most 1 to 7 wide subtrees.
     BuildInner: Array(buffer: "BuildInners", access: "", align: 16) {
         /// Numbers of the children.
         children: uint[2],
@@ -70,7 +70,7 @@ records! {
         reserved: uint[3],
     }
 
-    /// What passes of a build tell each other and the host.
+    /// Results of passes for the next ones and for the host.
     BuildState: Block(access: "coherent", align: 16) {
         /// Lower corner of the leaves' centres, times two, in an order that compares as uints.
         low: uint[3],
@@ -84,7 +84,7 @@ records! {
         blocks: uint,
         /// The greatest height of a cluster.
         height: uint,
-        /// The greatest height that there may be, at least the binary logarithm of the number of leaves.
+        /// The greatest height that there may be, at least the binary logarithm of `count`.
         max_height: uint,
         /// Padding to a multiple of 16 bytes.
         reserved: uint,
@@ -94,14 +94,15 @@ records! {
     BuildParams: Block(access: "readonly", align: 16) {
         /// The `BuildState`.
         state: address,
-        /// The steps: passes of the sort, rounds from `FIRST_ROUND` on, levels from `FIRST_LEVEL` on.
+        /// The steps: passes of the sort, rounds from `FIRST_ROUND` on, levels from
+        /// `FIRST_LEVEL` on.
         steps: address,
         /// A `BuildNode` per leaf and inner node.
         nodes: address,
         /// A `BuildInner` per inner node.
         inners: address,
-        /// Two arrays in turn of a `uvec2` per leaf: keys and leaves while they are sorted, partners
-        /// and clusters, then blocks and nodes of a level.
+        /// Two arrays in turn of a `uvec2` per leaf: keys and leaves while they are sorted, then
+        /// partners and clusters, then nodes of a level.
         pairs: address[2],
         /// A `uint` per digit and tile of the sort, or two per tile of clusters.
         counts: address,
