@@ -21,6 +21,7 @@ use crate::interface::records::builder::{
 };
 use crate::interface::records::ray::Push;
 use crate::shaders;
+use crate::stage;
 
 const _: () = assert!(MAX_TREE_LEVELS == MAX_DEPTH);
 
@@ -138,8 +139,9 @@ impl DeviceBuilder {
             return None;
         }
         let built = self.build(boxes, max_depth.unwrap_or(MAX_DEPTH), leaf);
-        if built.is_err() {
-            self.work.lock().unwrap_or_else(PoisonError::into_inner).stats.refused += 1;
+        match &built {
+            Ok(_) => stage::advance(boxes.len() as u64),
+            Err(_) => self.work.lock().unwrap_or_else(PoisonError::into_inner).stats.refused += 1,
         }
         built.ok()
     }
@@ -260,13 +262,13 @@ impl DeviceBuildStats {
 
     /// The counts in words; `None` where nothing was to be built.
     pub fn text(&self) -> Option<String> {
-        let milliseconds = 1e3 * self.seconds();
-        let refused = match self.refused {
-            0 => String::new(),
-            n => format!("; it could not build {n}, which the host did"),
-        };
+        let Self { trees, leaves, refused, .. } = self;
+        let refused = if *refused > 0 { format!("; {refused} that it could not build") } else { String::new() };
         (self.trees + self.refused > 0).then(|| {
-            format!("the device built {} BVHs over {} leaves in {milliseconds:.1} ms{refused}", self.trees, self.leaves)
+            format!(
+                "BVHs built on the device: {trees}, over {leaves} leaves, in {:.1} ms{refused}",
+                1e3 * self.seconds()
+            )
         })
     }
 
