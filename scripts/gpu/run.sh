@@ -245,6 +245,8 @@ read -ra scenes <<< "$(pick "builtin:stairs" "builtin:terrain:1000000 builtin:ci
 read -ra more <<< "$(pick "--quick --rays 14400 --repeats 2" "--repeats 5")"
 step bench-build-device 60 "Hierarchies built on the device" "$skylit" bench rays "${scenes[@]}" "${more[@]}" --kernels wide,pipeline --build device --check --peers none \
   --time-limit "$(pick 30 45)" --json="$out/bench-build-device.json"
+step bench-build-mesh 60 "A mesh of Larsen's size, built on the device" "$skylit" bench frames --integrator ao --parts structures --tracer compute --build device \
+  --repeats "$(pick 1 3)" --peers none --json="$out/bench-build-mesh.json"
 step bench-build-host 60 "The same, built on the host" "$skylit" bench rays "${scenes[@]}" "${more[@]}" --kernels wide --build default --peers none \
   --time-limit "$(pick 30 45)" --json="$out/bench-build-host.json"
 read -ra scenes <<< "$(pick "cornell" "cornell sphere-diffuse")"
