@@ -240,6 +240,15 @@ read -ra scenes <<< "$(pick "builtin:stairs" "builtin:cornell-box builtin:stairs
 # brute force and the readable kernels are for comparison on a CPU
 read -ra more <<< "$(pick "--quick --rays 14400 --repeats 2" "--repeats 5")"
 step bench-rays 60 "Rays a second" "$skylit" bench rays "${scenes[@]}" "${more[@]}" --check --peers none --time-limit "$(pick 30 45)" --json="$out/bench-rays.json"
+# what the builder on the device takes, and the same hits as those of the hierarchies that the host builds
+read -ra scenes <<< "$(pick "builtin:stairs" "builtin:terrain:1000000 builtin:city:1000000")"
+read -ra more <<< "$(pick "--quick --rays 14400 --repeats 2" "--repeats 5")"
+step bench-build-device 60 "Hierarchies built on the device" "$skylit" bench rays "${scenes[@]}" "${more[@]}" --kernels wide,pipeline --build device --check --peers none \
+  --time-limit "$(pick 30 45)" --json="$out/bench-build-device.json"
+step bench-build-mesh 60 "A mesh of Larsen's size, built on the device" "$skylit" bench frames --integrator ao --parts structures --tracer compute --build device \
+  --repeats "$(pick 1 3)" --peers none --json="$out/bench-build-mesh.json"
+step bench-build-host 60 "The same, built on the host" "$skylit" bench rays "${scenes[@]}" "${more[@]}" --kernels wide --build default --peers none \
+  --time-limit "$(pick 30 45)" --json="$out/bench-build-host.json"
 read -ra scenes <<< "$(pick "cornell" "cornell sphere-diffuse")"
 read -ra more <<< "$(pick "--quick --strategies mis --reference-seconds 3" "--strategies mis,bsdf --seconds 1 --repeats 3 --reference-seconds 10")"
 step bench-path 60 "Path tracing: error against time" "$skylit" bench path "${scenes[@]}" "${more[@]}" --peers none --time-limit "$(pick 30 40)" --json="$out/bench-path.json"

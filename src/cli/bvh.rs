@@ -330,6 +330,9 @@ impl BvhArgs {
         if self.areas.as_deref() == Some("rays") && self.rays.is_none() {
             return Err(Error::Usage("--areas rays: add --rays RAYS.bin, or use --areas scene".into()));
         }
+        if self.build == BuildMethod::Device {
+            return Err(Error::Usage("--build device makes wide nodes for a tracer, and none of these trees".into()));
+        }
         let is_given = self.direction.is_some() || self.eye.is_some() || self.rays.is_some();
         if self.build.heuristic().is_some_and(HeuristicChoice::needs_rays) && !is_given {
             return Err(Error::Usage(format!(

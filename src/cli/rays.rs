@@ -94,6 +94,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
         "hits": hit_count,
         "build_seconds": stats.build_seconds,
         "upload_seconds": stats.upload_seconds,
+        "on_device": stats.on_device,
         "bytes_per_triangle": stats.bytes_per_primitive(),
         "mrays_s": on_device,
         "mrays_s_wall": on_wall,

@@ -115,6 +115,7 @@ impl Setup {
             let (areas, primitives) = (stats.areas, stats.area_primitives);
             features.push(format!("{areas} influence areas, whose trees hold {primitives} primitives"));
         }
+        features.extend(stats.on_device.text());
         Self {
             scene: renderer.name.clone(),
             scene_options: renderer.scene_options(settings),
@@ -160,6 +161,7 @@ impl Setup {
                 "stack_entries": self.stats.stack_entries,
                 "areas": self.stats.areas,
                 "area_primitives": self.stats.area_primitives,
+                "on_device": self.stats.on_device,
             },
             "seconds": seconds,
         });

@@ -78,6 +78,20 @@ pub const STREAMS: &[&StreamShaders] = &[
 pub static ANTIALIAS: ComputeShader = ComputeShader::new("antialias");
 /// The samples of a launch, added to the sums of the points of texels.
 pub static BAKE_SUM: ComputeShader = ComputeShader::new("bake_sum");
+/// Bounds of the centres of leaves, for the builder on the device.
+pub static BVH_BOUNDS: ComputeShader = ComputeShader::new("bvh_bounds");
+/// The wide nodes of a level, made of a binary tree.
+pub static BVH_EMIT: ComputeShader = ComputeShader::new("bvh_emit");
+/// Clusters that are each other's nearest, joined to nodes of a binary tree.
+pub static BVH_MERGE: ComputeShader = ComputeShader::new("bvh_merge");
+/// Morton codes of leaves.
+pub static BVH_MORTON: ComputeShader = ComputeShader::new("bvh_morton");
+/// The nearest cluster of each cluster.
+pub static BVH_NEAREST: ComputeShader = ComputeShader::new("bvh_nearest");
+/// Numbers of keys by digit, for sorting.
+pub static BVH_SORT_COUNT: ComputeShader = ComputeShader::new("bvh_sort_count");
+/// Keys in the order of a digit.
+pub static BVH_SORT_SCATTER: ComputeShader = ComputeShader::new("bvh_sort_scatter");
 /// Radiance of each pixel, of its filtered parts.
 pub static COMPOSE: ComputeShader = ComputeShader::new("compose");
 /// The spatial filter of radiance.
@@ -131,6 +145,13 @@ pub static TEMPORAL: ComputeShader = ComputeShader::new("temporal");
 pub const COMPUTE: &[&ComputeShader] = &[
     &ANTIALIAS,
     &BAKE_SUM,
+    &BVH_BOUNDS,
+    &BVH_EMIT,
+    &BVH_MERGE,
+    &BVH_MORTON,
+    &BVH_NEAREST,
+    &BVH_SORT_COUNT,
+    &BVH_SORT_SCATTER,
     &COMPOSE,
     &DENOISE,
     &DISPLAY,

@@ -51,6 +51,7 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         few: None,
         launch: LaunchMemory::new(device, None)?,
         dynamic: None,
+        builder: None,
         areas: None,
     })
 }

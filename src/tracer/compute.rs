@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::device_builder::DeviceBuilder;
 use super::hierarchy::Hierarchy;
 use super::kernel::{BuildOptions, Kernel};
 use super::{brute, reference, wide};
@@ -20,7 +21,13 @@ pub(super) enum Trees {
 }
 
 impl Trees {
-    pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
+    /// `device`: builds trees of wide nodes, where it can.
+    pub fn build(
+        flat: &FlatScene,
+        kernel: Kernel,
+        options: &BuildOptions,
+        device: Option<&DeviceBuilder>,
+    ) -> Result<Self> {
         let total = flat.primitive_count();
         if total > bvh2::MAX_PRIMITIVES || flat.instances.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
@@ -29,7 +36,7 @@ impl Trees {
                 bvh2::MAX_PRIMITIVES
             )));
         }
-        if !flat.motion.is_none() && !matches!(kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) {
+        if !flat.motion.is_none() && !kernel.is_wide() {
             return Err(Error::Usage(format!(
                 "traversal '{kernel}' is for static scenes; use --traversal {}",
                 Kernel::Wide
@@ -45,7 +52,9 @@ impl Trees {
         }
         let _stage = stage::begin_counted("building the BVH", total as u64);
         Ok(match kernel {
-            Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => {
+                Trees::Wide(wide::Trees::build(flat, options, device), kernel)
+            }
             Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options)?, kernel),
             Kernel::Brute => {
                 brute::check(flat)?;

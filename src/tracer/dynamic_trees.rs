@@ -14,6 +14,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::{padding, reach_padding};
+use super::device_builder::DeviceBuilder;
 use super::transform::{instance_padding, transformed_bounds, world_to_group};
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
@@ -164,10 +165,11 @@ impl DynamicTrees {
     }
 
     /// Refits the tree of a deformed group, or rebuilds it when the policy decides so. Returns
-    /// whether it was rebuilt, and its SAH cost relative to that at the last build.
+    /// whether it was rebuilt, and its SAH cost relative to that at the last build. `builder`
+    /// rebuilds it on the device, where it can.
     pub fn deform(
         &mut self,
-        device: &Arc<Device>,
+        (device, builder): (&Arc<Device>, Option<&DeviceBuilder>),
         nodes: &mut Buffer,
         group: usize,
         positions: &[Vec3],
@@ -176,10 +178,33 @@ impl DynamicTrees {
             return Err(Error::Vulkan(format!("group {group} was not declared as deforming")));
         };
         let start = Instant::now();
+        let reach = |(v, p): (usize, &Vec3)| match &deforming.used {
+            Some(used) if !used[v] => 0.0,
+            _ => p.abs().max_element(),
+        };
+        let pad =
+            reach_padding(positions.par_iter().with_min_len(4096).enumerate().map(reach).reduce(|| 0.0, f32::max));
+        let leaf = |block: &mut Block| rewrite_pair(block, positions, &deforming.indices);
+
+        // another tree: on the device over the same leaves, pairs of triangles as they are
         if self.groups[group].should_rebuild() {
-            let triangles = Triangles { positions: positions.to_vec(), indices: deforming.indices.clone() };
-            let built =
-                triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default, Some(self.groups[group].depth));
+            let depth = Some(self.groups[group].depth);
+            let array = blocks(&mut self.copy, nodes)?;
+            let rebuild = |builder: &DeviceBuilder| {
+                let all = array[self.groups[group].range()].par_iter();
+                let (leaves, boxes): (Vec<Block>, Vec<Aabb>) = all
+                    .filter(|b| wide::is_leaf(b))
+                    .map(|&(mut block)| {
+                        let b = leaf(&mut block);
+                        (block, Aabb { min: b.min - pad, max: b.max + pad })
+                    })
+                    .unzip();
+                builder.try_build(&boxes, depth, &|k| leaves[k as usize])
+            };
+            let built = builder.and_then(rebuild).unwrap_or_else(|| {
+                let triangles = Triangles { positions: positions.to_vec(), indices: deforming.indices.clone() };
+                triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default.into(), depth)
+            });
             let seconds = start.elapsed().as_secs_f64();
             if built.blocks.len() > self.groups[group].capacity {
                 self.grow(device, nodes, group, spare_capacity(built.blocks.len()))?;
@@ -188,13 +213,8 @@ impl DynamicTrees {
             self.flush(nodes, self.groups[group].range())?;
             return Ok((true, 1.0));
         }
-        let reach = |(v, p): (usize, &Vec3)| match &deforming.used {
-            Some(used) if !used[v] => 0.0,
-            _ => p.abs().max_element(),
-        };
-        let pad =
-            reach_padding(positions.par_iter().with_min_len(4096).enumerate().map(reach).reduce(|| 0.0, f32::max));
-        let leaf = |block: &mut Block| rewrite_pair(block, positions, &deforming.indices);
+
+        // or the same one with other boxes
         self.groups[group].refit(blocks(&mut self.copy, nodes)?, pad, leaf, start);
         self.flush(nodes, self.groups[group].range())?;
         Ok((false, self.groups[group].growth()))
@@ -218,7 +238,7 @@ impl DynamicTrees {
         };
         let rebuild = instances.len() <= MAX_TOP_REBUILD || top.should_rebuild();
         if rebuild {
-            let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
+            let built = tree(boxes, BuildPreset::Fast.into(), Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
         } else {
             let pad = padding(boxes.iter());

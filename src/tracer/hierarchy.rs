@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::device_builder::DeviceBuilder;
 use super::dynamic_trees::DynamicTrees;
 use super::kernel::Kernel;
 use super::lane_budget::stack_constant;
@@ -49,6 +50,8 @@ pub(super) struct Hierarchy {
     pub launch: LaunchMemory,
     /// State to update it in a dynamic scene (fast kernel only).
     pub dynamic: Option<Box<DynamicTrees>>,
+    /// Builds trees of a dynamic scene on the device; `None`: the host does.
+    pub builder: Option<DeviceBuilder>,
     /// Influence areas that have trees of their own (binary kernels only).
     pub areas: Option<AreaBuffers>,
 }
@@ -88,7 +91,7 @@ impl Hierarchy {
     /// See [`DynamicTrees::deform`].
     pub fn deform(&mut self, device: &Arc<Device>, group: usize, positions: &[Vec3]) -> Result<(bool, f64)> {
         match &mut self.dynamic {
-            Some(d) => d.deform(device, &mut self.nodes, group, positions),
+            Some(d) => d.deform((device, self.builder.as_ref()), &mut self.nodes, group, positions),
             None => Ok((false, 1.0)),
         }
     }

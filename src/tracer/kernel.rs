@@ -40,6 +40,11 @@ impl Kernel {
         flat.instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
     }
 
+    /// Whether it traverses the BVH of wide nodes.
+    pub fn is_wide(self) -> bool {
+        matches!(self, Self::Auto | Self::Wide | Self::Packet)
+    }
+
     /// The kernel for coherent streams on a device. A packet's loop has many more iterations than a
     /// single ray's, without a bound: on drivers that end long loops early, packets run only when
     /// requested.
@@ -94,6 +99,9 @@ pub struct BuildOptions {
     pub heuristic: Option<Heuristic>,
     /// Trees of influence areas besides that of the scene, for the binary kernels only.
     pub local: Option<LocalOptions>,
+    /// Build the trees of the wide kernels over at least so many leaves on the device; `None`
+    /// builds all of them on the host.
+    pub on_device: Option<usize>,
     /// Approximate number of rays that will be traced.
     pub rays: u64,
     /// Cache of built hierarchies, used for those of the wide kernel only; `None` caches nothing.
@@ -109,6 +117,7 @@ impl Default for BuildOptions {
             preset: Some(BuildPreset::Default),
             heuristic: None,
             local: None,
+            on_device: None,
             rays: 0,
             cache: None,
             streams: Vec::new(),

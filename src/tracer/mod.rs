@@ -11,6 +11,7 @@ mod attributes;
 mod boxes;
 mod brute;
 mod compute;
+pub mod device_builder;
 mod dynamic;
 mod dynamic_trees;
 pub mod entry_points;
@@ -42,6 +43,7 @@ mod wide;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
+pub use device_builder::{DeviceBuildStats, DeviceBuilder};
 pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
 pub use gpu_scene::MaterialChange;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, LocalOptions, TriangleTest};
@@ -95,6 +97,8 @@ pub struct BuildStats {
     /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for
     /// scenes of several trees.
     pub sah_cost: Option<f64>,
+    /// BVHs that the device has built.
+    pub on_device: DeviceBuildStats,
 }
 
 impl BuildStats {
@@ -177,6 +181,8 @@ impl Tracer {
         let shading = needs.shading.then(|| shading::features(flat, needs));
         let features = SceneFeatures { shading, ..SceneFeatures::from_flat(flat) };
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
+        let min_leaves = build.on_device.filter(|_| kind == TracerKind::Compute && options.kernel.is_wide());
+        let builder = min_leaves.map(|n| DeviceBuilder::new(device, n)).transpose()?;
 
         // the BVH first: its build needs the most host memory, which is freed before the scene's
         // buffers are filled
@@ -196,7 +202,7 @@ impl Tracer {
                     // without a further thread they are compiled when they are needed
                     let start_thread = || std::thread::Builder::new().spawn_scoped(scope, compile).ok();
                     let prepared = if is_needed { start_thread() } else { None };
-                    let trees = compute::Trees::build(flat, options.kernel, build);
+                    let trees = compute::Trees::build(flat, options.kernel, build, builder.as_ref());
                     // compiling pipelines is not counted as building
                     stats.build_seconds = start.elapsed().as_secs_f64();
                     let prepared = prepared.map(|p| p.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
@@ -213,7 +219,9 @@ impl Tracer {
         let structure = match hierarchy {
             Some(trees) => {
                 stats.sah_cost = trees.sah_cost();
-                let h = trees.upload(device, flat)?;
+                let mut h = trees.upload(device, flat)?;
+                stats.on_device = builder.as_ref().map(DeviceBuilder::stats).unwrap_or_default();
+                h.builder = builder.filter(|_| h.dynamic.is_some());
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;
                 stats.structure_bytes = h.bytes();
@@ -394,7 +402,7 @@ impl Tracer {
             ))
         })?;
         match &self.structure {
-            Structure::Compute(h) if matches!(h.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) => {
+            Structure::Compute(h) if h.kernel.is_wide() => {
                 let s = precompiled::specialization(&self.device.info, self.features, options, h.stack_constant());
                 shader.specialized(&self.device, &s)
             }

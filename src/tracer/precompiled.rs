@@ -43,7 +43,7 @@ impl PrecompiledPipelines {
         streams: &[&'static StreamShaders],
         primitives: usize,
     ) -> Vec<PipelineSpec> {
-        let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
+        let fast = options.kernel.is_wide();
         if !fast || primitives < MIN_PRIMITIVES {
             return Vec::new();
         }

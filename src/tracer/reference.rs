@@ -96,6 +96,7 @@ impl Trees {
             few: None,
             launch: LaunchMemory::new(device, None)?,
             dynamic: None,
+            builder: None,
             areas,
         })
     }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 #[cfg(feature = "cli")]
 use crate::settings::parse::parse_vector;
 use crate::settings::{AppliesTo, choices, settings};
-use crate::tracer::{BuildOptions, ComputeOptions, Kernel, LocalOptions, TracerKind, TriangleTest};
+use crate::tracer::{BuildOptions, ComputeOptions, DeviceBuilder, Kernel, LocalOptions, TracerKind, TriangleTest};
 
 choices! {
     /// Which tracer to use.
@@ -52,14 +52,21 @@ choices! {
         Default = "default",
         /// Spatial splits: fastest traversal
         Best = "best",
+        /// On the device, by parallel clustering
+        Device = "device",
     }
 }
 
 impl BuildChoice {
+    /// See [`BuildOptions::on_device`].
+    pub fn on_device(self) -> Option<usize> {
+        (self == BuildChoice::Device).then_some(DeviceBuilder::MIN_LEAVES)
+    }
+
     /// The build preset; `None` chooses by the numbers of primitives and rays.
     pub fn preset(self) -> Option<BuildPreset> {
         match self {
-            BuildChoice::Auto => None,
+            BuildChoice::Auto | BuildChoice::Device => None,
             BuildChoice::Fast => Some(BuildPreset::Fast),
             BuildChoice::Default => Some(BuildPreset::Default),
             BuildChoice::Best => Some(BuildPreset::Best),
@@ -79,6 +86,8 @@ choices! {
         Default = "default",
         /// Spatial splits: fastest traversal
         Best = "best",
+        /// On the device, by parallel clustering
+        Device = "device",
         /// Surface area, planes across the longest axis
         SahLongest = "sah-longest",
         /// Surface area, planes across all axes
@@ -109,7 +118,7 @@ impl BuildMethod {
     /// The rules of the laboratory; `None` for presets.
     pub fn heuristic(self) -> Option<HeuristicChoice> {
         match self {
-            Self::Auto | Self::Fast | Self::Default | Self::Best => None,
+            Self::Auto | Self::Fast | Self::Default | Self::Best | Self::Device => None,
             Self::SahLongest => Some(HeuristicChoice::SahLongest),
             Self::Sah => Some(HeuristicChoice::Sah),
             Self::SahSpfh => Some(HeuristicChoice::SahSpfh),
@@ -138,8 +147,8 @@ settings! {
         triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL), research;
         /// BVH build of the compute tracer [default: auto]
         ///
-        /// It is a quality, or for --traversal nearest and direction a rule for rays that are
-        /// known.
+        /// It is a quality, or the device, or for --traversal nearest and direction a rule for rays that
+        /// are known.
         build: Option<BuildMethod>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Direction of the rays that --build sah-spfh and pah... are for
         build_direction: Option<DVec3>,
@@ -194,6 +203,7 @@ impl DeviceSettings {
             preset: self.build().preset(),
             heuristic: heuristic.filter(|_| local.is_none()),
             local,
+            on_device: (self.build() == BuildMethod::Device).then_some(DeviceBuilder::MIN_LEAVES),
             rays,
             cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
             streams: Vec::new(),
@@ -255,6 +265,7 @@ impl DeviceSettings {
         }
         let option = match self.traversal {
             Some(Kernel::Brute) if self.build() != BuildMethod::Auto => Some("--build"),
+            Some(Kernel::Nearest | Kernel::Direction) if self.build() == BuildMethod::Device => Some("--build device"),
             Some(Kernel::Brute | Kernel::Nearest | Kernel::Direction) if self.bvh_cache.is_some() => {
                 Some("--bvh-cache")
             }
@@ -263,7 +274,11 @@ impl DeviceSettings {
         match (option, self.traversal) {
             (Some(option), Some(kernel)) => Err(Error::Usage(format!(
                 "{option} has no effect on --traversal {kernel}, which {}: leave it out, or choose another traversal",
-                if kernel == Kernel::Brute { "has no BVH" } else { "does not cache its BVH" }
+                match kernel {
+                    Kernel::Brute => "has no BVH",
+                    _ if self.bvh_cache.is_some() => "does not cache its BVH",
+                    _ => "has a BVH of binary nodes, which the host builds",
+                }
             ))),
             _ => Ok(()),
         }
@@ -369,6 +384,8 @@ mod tests {
             ("--build-direction 1,2,3", "--build-direction has no effect on --build auto"),
             ("--traversal nearest --build pah --build-direction 0,0,0", "--build-direction 0,0,0 is no direction"),
             ("--traversal direction --bvh-cache d", "--bvh-cache has no effect on --traversal direction"),
+            ("--traversal nearest --build device", "--build device has no effect on --traversal nearest"),
+            ("--tracer query --build device", "--build applies to the compute tracer"),
         ] {
             assert!(refused(line).is_some_and(|e| e.starts_with(about)), "{line}: {:?}", refused(line));
         }

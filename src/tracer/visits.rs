@@ -4,6 +4,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::device_builder::DeviceBuilder;
 use super::kernel::BuildOptions;
 use super::wide::Trees;
 use crate::accel::flatten::FlatScene;
@@ -30,9 +31,14 @@ impl VisitCounter {
     /// Builds the BVH as the compute tracer does. `None` for unsupported scenes: those of two
     /// levels, with spheres or with alpha.
     pub fn new(flat: &FlatScene) -> Option<Self> {
+        Self::with_builder(flat, None)
+    }
+
+    /// As [`VisitCounter::new`], for a BVH that a device builds.
+    pub fn with_builder(flat: &FlatScene, device: Option<&DeviceBuilder>) -> Option<Self> {
         let countable = flat.is_single_level() && !flat.has_spheres() && !flat.has_alpha();
         countable
-            .then(|| Trees::build(flat, &BuildOptions::default()))
+            .then(|| Trees::build(flat, &BuildOptions::default(), device))
             .and_then(Trees::into_only_group)
             .map(|w| Self { blocks: w.blocks })
     }

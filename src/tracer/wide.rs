@@ -10,6 +10,7 @@ use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
 use super::boxes::{instance_boxes, padding, primitive_boxes, reach_padding};
+use super::device_builder::DeviceBuilder;
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::hierarchy::{FewAddresses, Hierarchy, unfinished_counter};
 use super::kernel::{BuildOptions, Kernel};
@@ -41,11 +42,35 @@ pub(super) struct Trees {
     pub top_seconds: f64,
 }
 
+/// How a tree is built.
+#[derive(Clone, Copy)]
+pub(super) struct TreeBuilder<'a> {
+    /// How the host builds it.
+    preset: BuildPreset,
+    /// The device that builds it instead, where it can.
+    device: Option<&'a DeviceBuilder>,
+}
+
+impl From<BuildPreset> for TreeBuilder<'_> {
+    fn from(preset: BuildPreset) -> Self {
+        Self { preset, device: None }
+    }
+}
+
+impl<'a> TreeBuilder<'a> {
+    pub fn new(preset: BuildPreset, device: Option<&'a DeviceBuilder>) -> Self {
+        Self { preset, device }
+    }
+}
+
 impl Trees {
-    pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
+    /// `device`: builds the groups' trees, where it can.
+    pub fn build(flat: &FlatScene, options: &BuildOptions, device: Option<&DeviceBuilder>) -> Self {
         let timed = |g: &BlasGroup| {
             let start = Instant::now();
-            let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
+            let builder = TreeBuilder::new(options.preset(g.primitive_count), device);
+            let make = if g.spheres { sphere_tree } else { triangle_tree };
+            let tree = make(flat, g, options, builder);
             (tree, start.elapsed().as_secs_f64())
         };
         let (groups, seconds): (Vec<_>, _) = flat.groups.par_iter().map(timed).unzip();
@@ -56,10 +81,10 @@ impl Trees {
             // upload() fills in the root, once the groups have their ranges in the array
             let leaf = |entry: u32| bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0));
             match unique_instances(flat) {
-                None => tree(boxes, options.preset(flat.instances.len()), None, leaf),
+                None => tree(boxes, options.preset(flat.instances.len()).into(), None, leaf),
                 Some(kept) => {
                     let boxes = kept.iter().map(|&k| boxes[k as usize]).collect();
-                    tree(boxes, options.preset(kept.len()), None, |entry| leaf(kept[entry as usize]))
+                    tree(boxes, options.preset(kept.len()).into(), None, |entry| leaf(kept[entry as usize]))
                 }
             }
         });
@@ -158,6 +183,7 @@ impl Trees {
             bounds,
             unfinished: unfinished_counter(device)?,
             dynamic: dynamic.map(|mut d| d.keep_copy(device, &nodes).map(|()| d)).transpose()?,
+            builder: None,
             areas: None,
             nodes,
             few: few.transpose()?,
@@ -183,7 +209,7 @@ fn suspended_rays(device: &Arc<Device>, stack_entries: u32) -> Result<Arc<Buffer
 /// A tree over boxes, not yet padded. `depth`: maximum depth in nodes, if bounded.
 pub(super) fn tree(
     mut boxes: Vec<Aabb>,
-    preset: BuildPreset,
+    builder: TreeBuilder,
     depth: Option<u32>,
     leaf: impl Fn(u32) -> Block + Sync,
 ) -> WideBvh {
@@ -192,7 +218,10 @@ pub(super) fn tree(
     }
     let pad = padding(boxes.iter());
     boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
-    let binary = build::tree(&boxes, preset, None);
+    if let Some(tree) = builder.device.and_then(|d| d.try_build(&boxes, depth, &leaf)) {
+        return tree;
+    }
+    let binary = build::tree(&boxes, builder.preset, None);
     drop(boxes);
     collapse(binary, depth, leaf)
 }
@@ -297,13 +326,15 @@ fn check_loaded(tree: &WideBvh, source: &impl LeafSource, preset: BuildPreset) -
 /// and stored there.
 fn load_or_build(
     options: &BuildOptions,
-    preset: BuildPreset,
+    builder: TreeBuilder,
     content: &[&[u8]],
     source: &impl LeafSource,
     build: impl FnOnce() -> WideBvh,
 ) -> WideBvh {
     let Some(cache) = &options.cache else { return build() };
-    let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
+    let preset = builder.preset;
+    let name = if builder.device.is_some() { "on the device".to_owned() } else { format!("{preset:?}") };
+    let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(name.as_bytes());
     let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
     let tree_of = |entries: Entries| {
         let kept = *entries.get::<CachedTree>("tree")?.first()?;
@@ -330,8 +361,7 @@ fn load_or_build(
     wide
 }
 
-fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
-    let preset = options.preset(group.primitive_count);
+fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions, builder: TreeBuilder) -> WideBvh {
     let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
         .into_par_iter()
         .map(|primitive| {
@@ -343,15 +373,15 @@ fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> W
     // whether spheres that are the same are held once
     let once = group.opaque_count == group.primitive_count && flat.motion.is_none();
     let source = Spheres { spheres: &spheres, once };
-    load_or_build(options, preset, &[b"spheres", &[u8::from(once)], bytemuck::cast_slice(&spheres)], &source, || {
+    load_or_build(options, builder, &[b"spheres", &[u8::from(once)], bytemuck::cast_slice(&spheres)], &source, || {
         let leaf = |primitive: u32| source.block(primitive);
         let boxes: Vec<Aabb> = primitive_boxes(flat, group).collect();
         let kept = if once { firsts(spheres.len() as u32, |k| spheres[k as usize].map(bits)) } else { None };
         match kept {
-            None => tree(boxes, preset, None, leaf),
+            None => tree(boxes, builder, None, leaf),
             Some(kept) => {
                 let boxes = kept.iter().map(|&k| boxes[k as usize]).collect();
-                tree(boxes, preset, None, |k| leaf(kept[k as usize]))
+                tree(boxes, builder, None, |k| leaf(kept[k as usize]))
             }
         }
     })
@@ -417,9 +447,8 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
+fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions, builder: TreeBuilder) -> WideBvh {
     let triangles = Triangles::from_group(flat, group);
-    let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
     let is_fixed = flat.motion.is_none();
     let content: [&[u8]; 4] = [
@@ -429,11 +458,11 @@ fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) ->
         bytemuck::cast_slice(&triangles.indices),
     ];
     let source = TriangleSource { triangles: &triangles, opaque, once: if is_fixed { opaque } else { 0 } };
-    load_or_build(options, preset, &content, &source, || {
+    load_or_build(options, builder, &content, &source, || {
         if is_fixed {
-            unique_triangle_tree(&triangles, opaque, preset)
+            unique_triangle_tree(&triangles, opaque, builder)
         } else {
-            triangle_tree_of(&triangles, opaque, preset, None)
+            triangle_tree_of(&triangles, opaque, builder, None)
         }
     })
 }
@@ -469,16 +498,16 @@ impl LeafSource for TriangleSource<'_> {
 /// A tree that has opaque triangles with the same three corners once, the first of them: a ray that
 /// meets one meets all of them at the same distance, and which of them it meets is not said. Very
 /// many would make a traversal that some drivers do not finish.
-fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset) -> WideBvh {
+fn unique_triangle_tree(triangles: &Triangles, opaque: u32, builder: TreeBuilder) -> WideBvh {
     let all = &triangles.indices;
     let Some(mut numbers) = firsts(opaque, |k| same_from_first(triangles.corners(all[k as usize]))) else {
-        return triangle_tree_of(triangles, opaque, preset, None);
+        return triangle_tree_of(triangles, opaque, builder, None);
     };
     let kept = numbers.len() as u32;
     numbers.extend(opaque..all.len() as u32);
     let indices = numbers.iter().map(|&k| all[k as usize]).collect();
     let few = Triangles { positions: triangles.positions.clone(), indices };
-    let mut tree = triangle_tree_of(&few, kept, preset, None);
+    let mut tree = triangle_tree_of(&few, kept, builder, None);
     for block in tree.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
         let leaf: &mut TriangleLeaf = bytemuck::cast_mut(block);
         for id in leaf.primitives.iter_mut().filter(|id| **id != pairs::NONE) {
@@ -539,7 +568,12 @@ fn same_from_first(corners: [Vec3; 3]) -> [[u32; 3]; 3] {
 }
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
-pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> WideBvh {
+pub(super) fn triangle_tree_of(
+    triangles: &Triangles,
+    opaque: u32,
+    builder: TreeBuilder,
+    depth: Option<u32>,
+) -> WideBvh {
     let single: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
     let pairs = pairs::pair_up(&triangles.indices, &single, triangles.positions.len());
     let boxes: Vec<Aabb> = pairs
@@ -556,14 +590,21 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
         return WideBvh::default();
     }
     let pad = padding(boxes.iter());
+    let leaf = |pair: u32| pair_block(triangles, pairs[pair as usize], opaque).expect("a pair shares an edge");
+    if let Some(device) = builder.device {
+        let padded: Vec<Aabb> = boxes.par_iter().map(|b| Aabb { min: b.min - pad, max: b.max + pad }).collect();
+        if let Some(tree) = device.try_build(&padded, depth, &leaf) {
+            return tree;
+        }
+    }
     let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
         for t in pairs[pair as usize].triangles.into_iter().filter(|&t| t != pairs::NONE) {
             see(triangles.corners(triangles.indices[t as usize]));
         }
     };
-    let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
+    let binary = build::tree_with_splits(&boxes, &of_pair, builder.preset, pad);
     drop(boxes);
-    collapse(binary, depth, |pair| pair_block(triangles, pairs[pair as usize], opaque).expect("a pair shares an edge"))
+    collapse(binary, depth, leaf)
 }
 
 /// The leaf of a pair of triangles; `None` if they share no edge.
@@ -599,7 +640,7 @@ pub mod probes {
     /// bytes, then its blocks as a cache file has them.
     pub fn hierarchy(scene: &Scene) -> Vec<u8> {
         let flat = FlatScene::new(scene);
-        let tree = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let tree = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default(), BuildPreset::Default.into());
         [&tree.depth.to_le_bytes()[..], bytemuck::cast_slice(&tree.blocks)].concat()
     }
 
@@ -613,7 +654,7 @@ pub mod probes {
         let triangles = Triangles::from_group(&flat, &flat.groups[0]);
         let opaque = flat.groups[0].opaque_count as u32;
         let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
-        let built = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let built = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default(), BuildPreset::Default.into());
         let Some((depth, blocks)) = bytes.split_first_chunk::<4>() else { return false };
         if blocks.len() % size_of::<Block>() != 0 {
             return false;
@@ -649,7 +690,7 @@ mod tests {
     fn check(name: &str) {
         let scene = builtin::by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
-        let trees = Trees::build(&flat, &BuildOptions::default());
+        let trees = Trees::build(&flat, &BuildOptions::default(), None);
         for (tree, group) in trees.groups.iter().zip(&flat.groups) {
             let triangles = Triangles::from_group(&flat, group);
             let boxes: Vec<Aabb> = primitive_boxes(&flat, group).collect();
@@ -699,7 +740,7 @@ mod tests {
         indices.extend([[0, 1, 2]; 5]);
         let triangles = Triangles { positions, indices };
         let expected: Vec<u32> = [0, 1, 3].into_iter().chain((opaque..opaque + 5).map(|k| k | ALPHA_TESTED)).collect();
-        assert_eq!(held(&unique_triangle_tree(&triangles, opaque, BuildPreset::Default)), expected);
+        assert_eq!(held(&unique_triangle_tree(&triangles, opaque, BuildPreset::Default.into())), expected);
         // and where each has vertices of its own, and a zero is negative
         let mut own = Triangles { positions: Vec::new(), indices: Vec::new() };
         for (k, t) in triangles.indices.iter().enumerate() {
@@ -709,7 +750,7 @@ mod tests {
                 .extend(triangles.corners(*t).map(|p| if k % 2 == 0 { p } else { -Vec3::ZERO + p * Vec3::ONE }));
         }
         own.positions.iter_mut().skip(9).step_by(4).for_each(|p| p.z = if p.z == 0.0 { -0.0 } else { p.z });
-        assert_eq!(held(&unique_triangle_tree(&own, opaque, BuildPreset::Default)), expected);
+        assert_eq!(held(&unique_triangle_tree(&own, opaque, BuildPreset::Default.into())), expected);
     }
 
     /// Numbers of the triangles that a tree holds, with their flags.
@@ -734,7 +775,7 @@ mod tests {
         let moved =
             |x: f64| Instance { object_to_world: glam::DAffine3::from_translation(glam::DVec3::X * x), ..one.clone() };
         scene.instances = [vec![moved(1.0)], vec![one.clone(); 500], vec![moved(2.0)], vec![moved(1.0)]].concat();
-        let trees = Trees::build(&FlatScene::new(&scene), &BuildOptions::default());
+        let trees = Trees::build(&FlatScene::new(&scene), &BuildOptions::default(), None);
         let top = trees.top.unwrap();
         let leaves = top.blocks.iter().filter(|b| wide::is_leaf(b));
         let mut held: Vec<u32> = leaves.map(|b| bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance).collect();
@@ -745,7 +786,7 @@ mod tests {
             Geometry::Spheres([vec![sphere(3.0)], vec![sphere(0.0); 700], vec![sphere(-0.0)]].concat());
         scene.instances.truncate(1);
         let flat = FlatScene::new(&scene);
-        let tree = sphere_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let tree = sphere_tree(&flat, &flat.groups[0], &BuildOptions::default(), BuildPreset::Default.into());
         let leaves =
             tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, SphereLeaf>(b));
         let mut held: Vec<u32> = leaves.map(|l| l.primitives[0] & !SPHERE).collect();
@@ -806,7 +847,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let cache = crate::accel::cache::Cache::new(folder.path());
             let options = BuildOptions { cache: Some(cache.clone()), ..Default::default() };
-            let build = || Trees::build(&flat, &options).groups.swap_remove(0);
+            let build = || Trees::build(&flat, &options, None).groups.swap_remove(0);
             let good = build();
             let same = |tree: &WideBvh| tree.blocks == good.blocks && tree.depth == good.depth;
             // what was stored is taken
@@ -833,7 +874,7 @@ mod tests {
         let triangles = Triangles::from_group(&flat, &flat.groups[0]);
         let opaque = flat.groups[0].opaque_count as u32;
         let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
-        let good = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let good = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default(), BuildPreset::Default.into());
         check_loaded(&good, &source, BuildPreset::Default).unwrap();
         let bits = good.blocks.len() * 512;
         let accepted = (0..bits).step_by(7).filter(|bit| {

@@ -473,6 +473,18 @@ fn gpu_render_end_to_end() {
             record["mean"]
         );
     }
+    // and so does a hierarchy that the device built
+    let terrain = |build: &str| {
+        let again = at("b.exr");
+        let args = ["render", "builtin:terrain:20000", "--size", "32x24", "--spp", "1", "-o", &again];
+        json(&run(&[&args[..], &["--tracer", "compute", "--build", build, "--explain", "--json"]].concat()))
+    };
+    let records = ["fast", "device"].map(terrain);
+    assert_eq!(records[0]["mean"], records[1]["mean"]);
+    let trees = records.each_ref().map(|r| r["build"]["on_device"]["trees"].as_u64());
+    assert_eq!(trees, [Some(0), Some(1)]);
+    assert!(records[1]["explain"].to_string().contains("BVHs built on the device: 1"), "{}", records[1]["explain"]);
+    refuses(&["bvh", "builtin:plane", "--build", "device"], 64, "--build device makes wide nodes");
     let other = ["--tracer", "pipeline", "--traversal", "nearest"];
     refuses(&[&base[..], &[&png], &other].concat(), 64, "--tracer compute");
     let many = ["render", "builtin:spheres:50000", "--size", "8x8", "--traversal", "brute", "-o", &png];

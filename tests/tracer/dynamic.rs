@@ -14,7 +14,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::scene::builtin::{by_name, shapes};
 use skylit::scene::{Geometry, Motion, Scene};
-use skylit::tracer::{Changes, Kernel, MeshChange, Tracer, TracerKind, UpdateStats};
+use skylit::tracer::{BuildOptions, Changes, ComputeOptions, Kernel, MeshChange, Tracer, TracerKind, UpdateStats};
 
 use crate::common;
 use crate::common::{ALL, assert_validation_clean, closest, device, scene, tracers};
@@ -45,8 +45,13 @@ struct Follower {
 
 impl Follower {
     fn new(device: &Arc<Device>, kind: TracerKind, scene: &Scene, motion: Motion) -> Self {
+        Self::with_build(device, kind, scene, motion, &BuildOptions::default())
+    }
+
+    fn with_build(device: &Arc<Device>, kind: TracerKind, scene: &Scene, motion: Motion, build: &BuildOptions) -> Self {
         let flat = FlatScene::with_motion(scene, motion.clone()).unwrap();
-        let tracer = Tracer::new(device, kind, &flat, ALL).unwrap();
+        let tracer = Tracer::with_build(device, kind, &flat, ALL, ComputeOptions::default(), build).unwrap();
+        assert_eq!(tracer.stats().on_device.trees > 0, build.on_device.is_some());
         Self { scene: scene.clone(), motion, tracer, steps: 0 }
     }
 
@@ -197,12 +202,15 @@ fn sphere_on_a_plane() -> (Scene, usize) {
 fn gpu_deforming_mesh() {
     let device = device();
     let (scene, mesh) = sphere_on_a_plane();
-    for kind in tracers(&device) {
-        let mut f = Follower::new(
+    // the compute tracer once more, with trees that the device builds
+    let all = tracers(&device).into_iter().map(|kind| (kind, None)).chain([(TracerKind::Compute, Some(0))]);
+    for (kind, on_device) in all {
+        let mut f = Follower::with_build(
             &device,
             kind,
             &scene,
             Motion { instances: Vec::new(), meshes: vec![mesh], ..Motion::default() },
+            &BuildOptions { on_device, ..Default::default() },
         );
         let used = positions(&scene, mesh).len() - 1;
         for step in 0..3 {

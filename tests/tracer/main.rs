@@ -6,6 +6,7 @@ mod common;
 
 mod animation;
 mod degenerate;
+mod device_builder;
 mod dynamic;
 mod kernel;
 mod parity;

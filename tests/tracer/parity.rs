@@ -148,21 +148,23 @@ fn gpu_parity_sponza() {
 #[test]
 fn gpu_parity_of_builds() {
     let device = device();
-    for name in ["leaf-cards", "cornell-box"] {
+    for name in ["leaf-cards", "cornell-box", "spheres:500"] {
         let scene = scene(name);
         let oracle = Oracle::new(&scene, scene.origin());
         let rays = ray_set(&oracle, &scene, 200_000);
-        let distances = |preset, mode| {
-            let build = BuildOptions { preset: Some(preset), ..Default::default() };
+        let distances = |preset, on_device, mode| {
+            let build = BuildOptions { preset: Some(preset), on_device, ..Default::default() };
             let (flat, options) = (FlatScene::new(&scene), ComputeOptions::default());
             let t = Tracer::with_build(&device, TracerKind::Compute, &flat, common::ALL, options, &build).unwrap();
             let hits = trace(&t, &rays, mode, 1, &mut NoControl).unwrap().0;
             hits.iter().map(|h| if mode == Mode::Any { h.is_hit() as u32 } else { h.t.to_bits() }).collect::<Vec<_>>()
         };
         for mode in [Mode::Closest, Mode::Any] {
-            let expected = distances(BuildPreset::Fast, mode);
-            for preset in [BuildPreset::Default, BuildPreset::Best] {
-                assert!(distances(preset, mode) == expected, "{name} {preset:?} {mode:?}");
+            let expected = distances(BuildPreset::Fast, None, mode);
+            for (preset, on_device) in
+                [(BuildPreset::Default, None), (BuildPreset::Best, None), (BuildPreset::Default, Some(0))]
+            {
+                assert!(distances(preset, on_device, mode) == expected, "{name} {preset:?} {on_device:?} {mode:?}");
             }
         }
     }

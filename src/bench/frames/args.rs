@@ -281,7 +281,7 @@ impl BenchFramesArgs {
     /// Build options of a hierarchy for images of this size.
     pub fn build_options(&self, [width, height]: [u32; 2]) -> BuildOptions {
         let rays = u64::from(width) * u64::from(height) * u64::from(self.reference_paths());
-        BuildOptions { preset: self.build.preset(), rays, ..Default::default() }
+        BuildOptions { preset: self.build.preset(), on_device: self.build.on_device(), rays, ..Default::default() }
     }
 
     /// Frames of a run.

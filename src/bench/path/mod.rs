@@ -74,6 +74,7 @@ impl PathSession<'_> {
         let paths = u64::from(size[0]) * u64::from(size[1]) * 4096;
         let build = BuildOptions {
             preset: args.build.preset(),
+            on_device: args.build.on_device(),
             rays: paths,
             streams: path::streams().to_vec(),
             ..Default::default()

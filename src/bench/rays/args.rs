@@ -96,7 +96,7 @@ impl BenchRaysArgs {
         let [width, height] = self.size();
         // a set of rays is traced once more to warm up
         let rays = u64::from(width) * u64::from(height) * (u64::from(self.repeats()) + 1);
-        BuildOptions { preset: self.build.preset(), rays, ..Default::default() }
+        BuildOptions { preset: self.build.preset(), on_device: self.build.on_device(), rays, ..Default::default() }
     }
 
     /// Timed repeats.

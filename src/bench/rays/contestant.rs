@@ -10,7 +10,7 @@ use crate::gpu::{Device, DeviceInfo};
 use crate::integrators::ray_sets::{RaySet, sample};
 use crate::integrators::rays::{Mode, PreparedRays};
 use crate::ray::{Hit, Ray};
-use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
+use crate::tracer::{BuildOptions, DeviceBuildStats, Kernel, Needs, Tracer, TracerKind};
 
 /// A tracer of our own with its kernel. A new one is a line of [`KERNELS`].
 pub struct OwnKernel {
@@ -83,6 +83,8 @@ pub struct BuildCost {
     pub bytes_per_primitive: f64,
     /// Cost of the hierarchy by the surface area heuristic, where it is known.
     pub sah_cost: Option<f64>,
+    /// Builds of the device, if any.
+    pub on_device: DeviceBuildStats,
 }
 
 /// A contestant with a scene.
@@ -105,6 +107,7 @@ impl<'a> Contestant<'a> {
             upload_seconds: Some(stats.upload_seconds),
             bytes_per_primitive: stats.bytes_per_primitive(),
             sah_cost: stats.sah_cost,
+            on_device: stats.on_device,
         };
         let divisor = if device.info.is_cpu() { own.divisor } else { 1 };
         Ok(Self {
@@ -126,6 +129,7 @@ impl<'a> Contestant<'a> {
             upload_seconds: None,
             bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
             sah_cost: None,
+            on_device: DeviceBuildStats::default(),
         };
         let strict = peer.spec.strict.iter().any(|k| k == kernel);
         Ok(Self {

@@ -33,9 +33,9 @@ use crate::ray::Ray;
 use crate::report::thousands;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
-use crate::tracer::Kernel;
 use crate::tracer::settings::BuildChoice;
 use crate::tracer::visits::VisitCounter;
+use crate::tracer::{DeviceBuilder, Kernel};
 
 /// Share of a scene's progress that checking gets, with `--check`.
 const CHECK_SHARE: f64 = 0.3;
@@ -167,10 +167,13 @@ impl RaySession<'_> {
                 self.load_rays(&contestants, &mut failed, set, sets.get(set))?;
             }
         }
-        // the counter's tree is that of the default preset
-        let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= MAX_VISITED_PRIMITIVES;
+        // the counter's tree is that of the default preset, or of the device
+        let on_device = self.args.build.on_device();
+        let same = (self.args.build == BuildChoice::Default || on_device.is_some())
+            && flat.primitive_count() <= MAX_VISITED_PRIMITIVES;
         let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
-        let counter = if counted { VisitCounter::new(&flat) } else { None };
+        let builder = on_device.filter(|_| counted).map(|n| DeviceBuilder::new(&self.device, n)).transpose()?;
+        let counter = if counted { VisitCounter::with_builder(&flat, builder.as_ref()) } else { None };
 
         // Measures stream by stream, as long as there is time.
         let mut traced: Vec<&StreamKind> = Vec::new();
@@ -248,6 +251,14 @@ impl RaySession<'_> {
             let mut row = self.record.row(source, "building", &contestant.name).of_peer(is_peers);
             row.exact(plain("build", "s"), build.seconds).exact(plain("upload", "s"), build.upload_seconds);
             row.exact(quantity::BYTES, build.bytes_per_primitive).exact(plain("SAH cost", ""), build.sah_cost);
+            let device = Some(build.on_device).filter(|d| d.trees > 0);
+            for (name, seconds) in [
+                ("sorting", device.map(|d| d.sort_seconds)),
+                ("clustering", device.map(|d| d.cluster_seconds)),
+                ("wide nodes", device.map(|d| d.emit_seconds)),
+            ] {
+                row.exact(plain(name, "ms"), seconds.map(|s| 1e3 * s));
+            }
         }
     }
 

@@ -5,6 +5,7 @@ pub mod ao;
 pub mod aov;
 pub mod bake;
 pub mod block;
+pub mod builder;
 pub mod denoise;
 pub mod display;
 pub mod film;
@@ -27,7 +28,7 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 24] = [
+pub const FILES: [&File; 25] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
@@ -50,6 +51,7 @@ pub const FILES: [&File; 24] = [
     &aov::FILE,
     &ray_set::FILE,
     &hierarchy::FILE,
+    &builder::FILE,
     &sampler::FILE,
     &albedo::FILE,
 ];
