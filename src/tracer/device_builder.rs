@@ -127,6 +127,13 @@ impl DeviceBuilder {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).stats
     }
 
+    /// Counts and times so far; the memory is freed until the next build.
+    pub(super) fn take_stats(&self) -> DeviceBuildStats {
+        let mut work = self.work.lock().unwrap_or_else(PoisonError::into_inner);
+        work.memory = None;
+        std::mem::take(&mut work.stats)
+    }
+
     /// Builds a hierarchy as [`DeviceBuilder::build`] does, no deeper than `max_depth` if bounded.
     /// `None` where the host has to: for few leaves, and for those that the device cannot take.
     pub(super) fn try_build(

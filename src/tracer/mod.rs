@@ -219,8 +219,8 @@ impl Tracer {
         let structure = match hierarchy {
             Some(trees) => {
                 stats.sah_cost = trees.sah_cost();
+                stats.on_device = builder.as_ref().map(DeviceBuilder::take_stats).unwrap_or_default();
                 let mut h = trees.upload(device, flat)?;
-                stats.on_device = builder.as_ref().map(DeviceBuilder::stats).unwrap_or_default();
                 h.builder = builder.filter(|_| h.dynamic.is_some());
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;
