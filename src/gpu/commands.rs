@@ -84,7 +84,7 @@ impl Commands {
     /// Begins recording.
     fn begin(&self) -> Result<()> {
         let raw = &self.device.raw;
-        // SAFETY: the buffer and its queries are not in use, because every submission was waited for
+        // SAFETY: the buffer and its queries are not in use: every submission was waited for
         unsafe {
             if let Some(queries) = self.queries.filter(|_| self.written > 0) {
                 raw.reset_query_pool(queries, 0, self.written);

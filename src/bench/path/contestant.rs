@@ -42,8 +42,8 @@ impl<'a> Contestant<'a> {
         Self { name, reference, engine, by_spp: Vec::new(), biases: Vec::new(), longest_launch: None }
     }
 
-    /// The sample count to warm up with next: two in any case, then while images take less than half
-    /// of `seconds`, and once more where that should get to the error `target`.
+    /// The sample count to warm up with next: two in any case, then while images take less than
+    /// half of `seconds`, and once more where that should get to the error `target`.
     pub fn next_count(&self, seconds: f64, target: Option<f64>) -> Option<u32> {
         let Some(last) = self.by_spp.last() else { return Some(1) };
         let is_short = last.spp == 1 || 2.0 * last.seconds[0] < seconds;

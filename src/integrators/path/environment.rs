@@ -33,6 +33,8 @@ impl DeviceEnvironment {
             Environment::Uniform(c) => return Ok(plain(*c)),
             Environment::Map(map) => map,
         };
+
+        // how its directions are sampled
         let (width, height) = (map.width as usize, map.height as usize);
         let totals = Totals::from_map(map);
         let subtracted = if compensated { totals.compensation() } else { 0.0 };
@@ -44,6 +46,8 @@ impl DeviceEnvironment {
         let table = Buffer::from_slice(device, "environment distribution", &distribution.table)?;
         let guide = Buffer::from_slice(device, "environment guide", &distribution.guide)?;
         drop(distribution);
+
+        // what is seen in them
         let bytes = size_of::<[f32; 4]>() as u64;
         let mut texels = Buffer::new(device, "environment", bytes * map.radiance.len() as u64, Memory::Device)?;
         texels.fill(texels.size(), bytes, |first, out| {
@@ -52,6 +56,8 @@ impl DeviceEnvironment {
             out.par_iter_mut().zip(radiance).for_each(|(texel, c)| *texel = c.extend(weight(c) as f32).to_array());
         })?;
         let blurred = blurs.then(|| upload_blurred(device, map)).transpose()?;
+
+        // where both are
         let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
