@@ -282,8 +282,10 @@ fn gpu_clipping_planes() {
                 assert!(d.hits > 1000, "{name}: hardly anything is seen");
                 let drawn = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap();
                 let to_camera = camera.camera_to_world.inverse();
+                // looks at the whole scene
+                let origin = scene.origin();
                 for pixel in drawn.iter().filter(|p| p.instance != NONE) {
-                    let p = Vec3::from_array(pixel.position).as_dvec3() + scene.origin();
+                    let p = Vec3::from_array(pixel.position).as_dvec3() + origin;
                     let depth = -to_camera.transform_point3(p).z;
                     let ClipPlanes { near, far } = camera.clip;
                     assert!(

@@ -704,7 +704,8 @@ fn gpu_frames_continue_in_another_size() {
             (0..count).for_each(|_| frame(&mut frames, size, step));
             frames
         };
-        let truth = [(half, 0.02), (full, 0.1)].map(|(size, step)| at_rest(size, 77, step, 60).result().unwrap());
+        let truth = [(half, 0.02, 30), (full, 0.1, 60)]
+            .map(|(size, step, count)| at_rest(size, 77, step, count).result().unwrap());
         // at rest, then in motion at half the size
         let mut rests = at_rest(full, 0, 0.0, 30);
         let mut own = at_rest(full, 0, 0.0, 30);

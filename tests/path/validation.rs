@@ -129,8 +129,23 @@ fn everything() -> Scene {
     scene
 }
 
+/// Runs the test itself in a process whose CPU driver does not optimize kernels: each is compiled for an image of a few
+/// pixels, and optimizing them would be half of the test.
 #[test]
 fn gpu_kernels_of_all_features_are_valid() {
+    const TEST: &str = "validation::gpu_kernels_are_valid_here";
+    let child = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", TEST, "--ignored", "--nocapture"])
+        .env("GALLIVM_PERF", "nopt")
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&child.stdout);
+    assert!(child.status.success() && text.contains("1 passed"), "{text}{}", String::from_utf8_lossy(&child.stderr));
+}
+
+#[test]
+#[ignore = "gpu_kernels_of_all_features_are_valid runs it in a process of its own"]
+fn gpu_kernels_are_valid_here() {
     let device = new_device();
     let base = PathOptions { samples: SampleSettings::new([8, 8], 1, 0), max_depth: 3, ..Default::default() };
     let whole = PathOptions {
