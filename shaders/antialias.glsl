@@ -136,13 +136,14 @@ Neighbourhood neighbourhood(Images m, ivec2 pixel, vec2 samples_at) {
 
 // Where the pixel's centre was in the previous image, in pixels from the centre of the one in the upper left corner: it moved as the nearest surface around it, so that
 // edges move as a whole.
-// `before`: where that surface was, world space; of the background nothing.
+// `before`: where that surface was, in the previous camera's space; of the background nothing.
 bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 at, out vec3 before) {
     uint nearest = around.nearest;
     vec2 now;
     before = vec3(0.0);
     if (around.depth < INFINITY) {
-        before = is_null(f.previous_position) ? surface_position(f, nearest) : load_vec3(f.previous_position, nearest);
+        vec3 position = is_null(f.previous_position) ? surface_position(f, nearest) : load_vec3(f.previous_position, nearest);
+        before = affine(f.previous_world_to_camera, position);
         now = sample_place(f, vec2(image_pixel(f, nearest)));
     } else {
         // infinitely far away
@@ -159,10 +160,9 @@ bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 a
         at = image_point(f, f.previous_view, c.xy / -c.z) - 0.5;
         return all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(f.size) - 0.5));
     }
-    vec3 c = affine(f.previous_world_to_camera, before);
     bool orthographic = f.previous_orthographic != 0u;
-    if (!orthographic && !(c.z < 0.0)) return false;
-    vec2 place = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z);
+    if (!orthographic && !(before.z < 0.0)) return false;
+    vec2 place = image_point(f, f.previous_view, orthographic ? before.xy : before.xy / -before.z);
     at = vec2(pixel) + (place - now);
     return all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(f.size) - 0.5));
 }
@@ -181,25 +181,34 @@ bool has_moved_on(AntialiasParams p, vec3 position, float side) {
 }
 
 // Returns true if the previous image showed something around `at` that was in front of what is seen there now, and has moved on. What is not hit now, but is still there, is thinner than a pixel. `before`: where the nearest surface
-// around the pixel was.
+// around the pixel was, in the previous camera's space.
 bool is_uncovered(AntialiasParams p, FrameParams f, Images m, ivec2 pixel, Neighbourhood around, vec2 at, vec3 before) {
     bool is_background = !(around.depth < INFINITY), orthographic = f.previous_orthographic != 0u;
     float depth = INFINITY;
     vec2 surface_at = vec2(0.0);
     EdgeTest edge;
     if (!is_background) {
-        vec3 c = affine(f.previous_world_to_camera, before);
-        surface_at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z);
-        edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, surface_normal(f, around.nearest), surface_at);
-        depth = -c.z - edge.tolerance;
+        surface_at = image_point(f, f.previous_view, orthographic ? before.xy : before.xy / -before.z);
+        vec3 normal = surface_normal(f, around.nearest);
+        edge = edge_test(f, f.previous_view, orthographic, image_plane(f, f.previous_view, surface_at), before, linear(f.previous_world_to_camera, normal), normal);
+        depth = -before.z - edge.tolerance;
     }
     ivec2 centre = to_int(round(at));
     vec2 shift = f.previous_offset + 0.5;
-    for (int k = 0; k < 9; k++) {
-        ivec2 q = centre + ivec2(k % 3, k / 3) - 1;
-        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, m.size))) continue;
+    // bits of the neighbours that are in front: some lane has each of them, so a loop over its own is shorter
+    uint fronts = 0u;
+    [[unroll]] for (int k = 0; k < 9; k++) {
+        // at the image's borders some are looked at twice
+        ivec2 q = clamp(centre + ivec2(k % 3, k / 3) - 1, ivec2(0), m.size - 1);
         float there = uintBitsToFloat(LOAD_PAIR(m.previous_guide, image_index(m, q)).x);
-        if (!(there < depth) || (!is_background && !in_front(edge, vec2(q) + shift - surface_at, there))) continue;
+        bool is_front = there < depth && (is_background || in_front(edge, vec2(q) + shift - surface_at, there));
+        fronts |= is_front ? 1u << k : 0u;
+    }
+    while (fronts != 0u) {
+        int k = findLSB(fronts);
+        fronts &= fronts - 1u;
+        ivec2 q = clamp(centre + ivec2(k % 3, k / 3) - 1, ivec2(0), m.size - 1);
+        float there = uintBitsToFloat(LOAD_PAIR(m.previous_guide, image_index(m, q)).x);
         vec3 c = unproject(orthographic, image_plane(f, f.previous_view, vec2(q) + shift), there);
         c = affine(p.previous_to_camera, c);
         // where it would be if it had moved as what is behind it
@@ -247,10 +256,6 @@ Crease crease_at(FrameParams f, Images m, ivec2 pixel, uint at, uvec2 guide) {
         if (share > crease.share) crease = Crease(tap, share);
     }
     return crease;
-}
-
-bool camera_rests(FrameParams f) {
-    return f.world_to_camera == f.previous_world_to_camera && f.view == f.previous_view;
 }
 
 // Returns true if the light of a pixel, or of one beside it, has changed from one frame to the next.
@@ -311,10 +316,11 @@ void main() {
             } else {
                 // where nothing moves, no place is interpolated, and what is uncovered has no history: more frames are as sharp, and smoother
                 bool is_still = all(lessThan(abs(place - vec2(pixel)), vec2(1e-3)));
-                float past, most = is_still ? p.most_still_frames : camera_rests(f) ? min(p.most_frames, MOVING_FRAMES) : p.most_frames;
+                bool camera_rests = p.camera_rests != 0u;
+                float past, most = is_still ? p.most_still_frames : camera_rests ? min(p.most_frames, MOVING_FRAMES) : p.most_frames;
                 if (is_still) width *= STILL_CLAMP;
                 // under a camera that rests all frames' samples around a place say more of it than one
-                vec4 latest = camera_rests(f) && p.uncovers != 0u ? around.middle : now;
+                vec4 latest = camera_rests && p.uncovers != 0u ? around.middle : now;
                 vec4 history = max(clipped(resolved_at(m, place, past), around.mean, width), vec4(0.0));
                 frames = min(past + 1.0, most);
                 resolved = mix(history, latest, 1.0 / frames);

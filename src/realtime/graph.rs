@@ -37,6 +37,8 @@ pub struct Frame<'a> {
     pub plan: &'a FramePlan,
     /// From the space of the previous frame's camera to that of this one's, three rows.
     pub previous_to_camera: [[f32; 4]; 3],
+    /// Whether the camera is where it was in the previous frame, and sees as much.
+    pub camera_rests: bool,
     /// Address of the frame's `FrameParams`.
     pub params: u64,
     /// The buffer to display, if any.

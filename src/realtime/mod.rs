@@ -399,6 +399,7 @@ impl Realtime {
         }
         let stages = self.graph.begin(self.display.as_ref(), plan.progress.is_long);
         self.params.write(&self.frame_params(camera, plan.progress.is_still, plan.offset))?;
+        let previous = self.history.camera.unwrap_or(*camera);
         let frame = Frame {
             tracer,
             settings: &self.settings,
@@ -406,7 +407,8 @@ impl Realtime {
             camera: *camera,
             moved,
             plan,
-            previous_to_camera: between(&self.history.camera.unwrap_or(*camera), camera),
+            previous_to_camera: between(&previous, camera),
+            camera_rests: inverse(&previous) == inverse(camera) && previous.view == camera.view,
             params: self.params.address(),
             display: self.display,
         };

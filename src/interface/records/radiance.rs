@@ -182,8 +182,8 @@ records! {
         most_frames: float,
         /// Maximum number of frames of a history in which nothing moves.
         most_still_frames: float,
-        /// Padding.
-        reserved: float,
+        /// 1: the camera is where it was in the previous frame, and sees as much.
+        camera_rests: uint,
         /// Offset of the samples from their pixels' centres, pixels; 0 where each has its own.
         samples_at: vec2,
         /// Half width of the clamp of histories in motion, in their standard deviations.

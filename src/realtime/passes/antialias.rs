@@ -128,7 +128,7 @@ impl Pass for Antialias {
             has_history: frame.plan.has_resolved.into(),
             most_frames,
             most_still_frames: if has_new_light { NEW_LIGHT_FRAMES } else { STILL_FRAMES },
-            reserved: 0.0,
+            camera_rests: frame.camera_rests.into(),
             samples_at: if frame.plan.placement.spreads { [0.0; 2] } else { frame.plan.offset },
             clamp_width: CLAMP_WIDTH,
             holds: (!is_composed && frame.plan.progress.is_long).into(),
