@@ -76,13 +76,9 @@ fn gpu_unoccluded_catchers_show_what_is_behind() {
         let (scene, catcher) = caught(scene, 3.0);
         for kind in tracers(&device) {
             let all = [Backdrop::Map, Backdrop::Blurred, Backdrop::Transparent];
-            // other tracers have the same code, and all backdrops are black where nothing is behind
-            let shown = match (kind == TracerKind::Compute, has_sky) {
-                (true, true) => &all[..],
-                (true, false) => &all[2..],
-                (false, has_sky) => &all[..usize::from(has_sky)],
-            };
-            for &backdrop in shown {
+            // the others are the same code
+            let is_compute = kind == TracerKind::Compute;
+            for &backdrop in if is_compute { &all[..] } else { &all[..usize::from(has_sky)] } {
                 let options = PathOptions { backdrop, ..options(catcher, 8) };
                 let with = film(kind, &scene, &options);
                 let without = film(kind, &below, &PathOptions { catcher: None, ..options });

@@ -129,8 +129,8 @@ fn everything() -> Scene {
     scene
 }
 
-/// Runs the test itself in a process whose CPU driver does not optimize kernels: each is compiled for an image of a few
-/// pixels, and optimizing them would be half of the test.
+/// Runs `gpu_kernels_are_valid_here` in a process whose CPU driver does not optimize kernels: each is compiled for an
+/// image of a few pixels, and optimizing them would be half of the test.
 #[test]
 fn gpu_kernels_of_all_features_are_valid() {
     const TEST: &str = "validation::gpu_kernels_are_valid_here";
