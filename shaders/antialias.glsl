@@ -195,9 +195,9 @@ bool is_uncovered(AntialiasParams p, FrameParams f, Images m, ivec2 pixel, Neigh
     }
     ivec2 centre = to_int(round(at));
     vec2 shift = f.previous_offset + 0.5;
-    // bits of the neighbours that are in front: some lane has each of them, so a loop over its own is shorter
+    // the neighbours in front of the surface, a bit each: pixels have few, but those of a vector differ in which, and a loop over all would test each for all
     uint fronts = 0u;
-    [[unroll]] for (int k = 0; k < 9; k++) {
+    for (int k = 0; k < 9; k++) {
         // at the image's borders some are looked at twice
         ivec2 q = clamp(centre + ivec2(k % 3, k / 3) - 1, ivec2(0), m.size - 1);
         float there = uintBitsToFloat(LOAD_PAIR(m.previous_guide, image_index(m, q)).x);
